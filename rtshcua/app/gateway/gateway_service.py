@@ -209,6 +209,11 @@ class ClientJournal:
         self._writer.shutdown()
 
 
+def _waits(action: interface.Action) -> bool:
+    """Whether an action is carried out after what clients are told, and what is withheld from them."""
+    return not isinstance(action, interface.ToClient | interface.Withhold)
+
+
 class GatewayService:
     """A gateway that runs. `renew` gives the policy for the next session, or None to keep the present one."""
 
@@ -352,9 +357,9 @@ class GatewayService:
         return Now(now.monotonic_us, now.utc_us, min(now.utc_error_us, self._utc_error_us))
 
     def _take(self, event: Event, now: Now) -> None:
-        """Give the core an event, and carry out what it wants done."""
+        """Give the core an event, and carry out what it wants done: first the answers, for which clients wait."""
         if self._core is not None:
-            for action in self._core.take(event, now):
+            for action in sorted(self._core.take(event, now), key=_waits):
                 self._do(action, now)
 
     # ---------------------------------------------------------------- what arrives

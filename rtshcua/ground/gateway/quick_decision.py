@@ -70,6 +70,7 @@ class QuickDecision:
     def __init__(self, settings: GatewaySettings) -> None:
         self._policy = settings.policy
         self._state_of = settings.state_of
+        self._margins: dict[int, int] = {}  # by zone
         policy = settings.policy.policy
         self._skills = {contract.name: number for number, contract in enumerate(policy.contracts)}
         self._roles = {role: number for number, role in enumerate(policy.roles)}
@@ -168,7 +169,8 @@ class QuickDecision:
         """The nearest place in a zone, so far from its edge that the step may be permitted; None if none is known."""
         flat, cell, values = self._policy.policy, condition.cell, list(step.values)
         there = values[cell], values[cell + 1]
-        for margin_mm in _MARGINS_MM:
+        kept = self._margins.get(condition.zone)  # what was enough for another place is tried first
+        for margin_mm in _MARGINS_MM if kept is None else (kept, *(each for each in _MARGINS_MM if each != kept)):
             place = nearest_inside(flat.zones[condition.zone], there, margin_mm)
             if place is None:
                 return None
@@ -177,6 +179,7 @@ class QuickDecision:
             if not isinstance(moved, Refusal):
                 decision = decide(moved, state, self._policy, context, now)
                 if decision.outcome is Outcome.ALLOW or decision.reason in _NOT_HERE:
+                    self._margins[condition.zone] = margin_mm
                     latitude, longitude = unproject(flat.projection, *place)
                     return f"{degrees(latitude, 'NS')}, {degrees(longitude, 'EW')}"
         return None

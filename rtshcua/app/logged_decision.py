@@ -175,11 +175,12 @@ class LoggedDecision:
         if self._caused_by == STOOD_STILL and _for_unknown(record):
             return
         if isinstance(record, DecisionRecord):
+            self._falls = record.kind != STEP  # a link may fly while a step waits, and then the step is decided again
             if record.kind != STEP:
-                self._falls = True
-            elif record.outcome == "allow":
-                self.cause, self._caused_by, self._falls, self._late = None, "", False, False
-            elif record.outcome != "defer" and not self._falls and not (self._late and record.reason == _NO_SLACK):
+                return
+            if record.outcome == "allow":
+                self.cause, self._caused_by, self._late = None, "", False
+            elif record.outcome != "defer" and not (self._late and record.reason == _NO_SLACK):
                 self.cause, self._caused_by = self._tell(record), "decision"
         elif isinstance(record, Effect) and not self._falls:
             if record.event == "refused" and record.detail == WITHDRAWN:

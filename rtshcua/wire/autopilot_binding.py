@@ -119,6 +119,7 @@ def read_autopilot_binding(payload: bytes) -> AutopilotBinding:
         and 0 <= binding.covered_us <= binding.flown_us <= MAX_VALUE
         and 0 < len(binding.file) <= MAX_NAME
         and "/" not in binding.file
+        and binding.file.isprintable()
         and len(binding.deviations) <= MAX_DEVIATIONS
         and all(0 <= each.from_us <= each.to_us <= MAX_VALUE for each in binding.deviations)
     )

@@ -14,6 +14,7 @@ from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect
 from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.ground.flight.flight_content import SummaryLine, TrackView
 from rtshcua.ground.flight.flown import Flight
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.outcome import Reason
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.link import STOOD_STILL
@@ -153,14 +154,28 @@ class FlightSummary:
             told += self._stopped()
         if cause is not None:
             told += f" At {_seconds(flight.since_begun(cause.at_us))} {self._cause(flight.records[cause.seq])}"
-        flown = next(
-            (each for each in self._effects("dispatched") if each.kind != STEP and (not cause or each.seq > cause.seq)),
-            None,
-        )
-        if flown is not None:
-            subject, what = self._names.subject(flown.kind, flown.step, flown.link), self._names.detail(flown)
-            named = f", `{what}`," if what and what not in subject and self._details else ""
-            told += f" So at {_seconds(flight.since_begun(flown.at_us))} the {subject}{named} flew."
+        after = [each for each in self._effects("dispatched") if cause is not None and each.seq > cause.seq]
+        flown = [self._link(each) for each in after if each.kind != STEP]
+        if flown:
+            told += f" Then flew, from {_seconds(flight.since_begun(after[0].at_us))} on: {_listed(flown, ', then ')}."
+        return told + self._came_down()
+
+    def _link(self, record: Effect) -> str:
+        """What a dispatched link flies."""
+        what = self._names.text(record.kind, record.step, record.link) or self._names.detail(record)
+        return f"`{what}`" if what and self._details else self._names.subject(record.kind, record.step, record.link)
+
+    def _came_down(self) -> str:
+        """Whether the vehicle was seen to land at the end."""
+        told, motion = "", None
+        for each in self._effects("dispatched", "succeeded", "landed", *_ALOFT):
+            when = _seconds(self._flight.since_begun(each.at_us))
+            if each.event == "dispatched":
+                told, motion = "", self._names.motion(each)
+            elif each.event in _ALOFT:
+                told = f" When it was last seen, at {when}, it had not landed."
+            elif each.event == "landed" or motion in _DOWN:
+                told = f" It landed at {when}, as it reported."
         return told
 
     def _stopped(self) -> str:
@@ -176,14 +191,31 @@ class FlightSummary:
     def _cause(self, record: AnyRecord) -> str:
         """The cause of an early end, in a sentence."""
         if isinstance(record, DecisionRecord):
-            subject = self._names.subject(record.kind, record.step, record.link)
-            clause = "" if record.clause is None else f", because of `{' '.join(record.clause.split())}`"
-            return f"{subject} was not allowed ({record.reason}){clause}."
+            return self._denied(record)
         if not isinstance(record, Effect):
             return f"the log says: {' '.join(self._names.tell(record).split())}."
         subject = self._names.subject(record.kind, record.step, record.link)
         detail = self._names.detail(record).rstrip(".") if self._details else ""
+        clause, _, values = detail.rpartition(": ")
+        if record.event == "violated" and clause:
+            detail = f"`{clause}` decided, with {values}"
+        elif record.event == "taken-over" and detail:
+            detail = f"its flight mode became {detail}"
         return f"{subject or 'the flight'} {CAUSES.get(record.event, record.event)}{f': {detail}' if detail else ''}."
+
+    def _denied(self, record: DecisionRecord) -> str:
+        subject = self._names.subject(record.kind, record.step, record.link)
+        views = self._collected.decisions_told()
+        view = next((each for each in views if each.seq <= record.seq and each.subject == subject
+                     and each.reason == record.reason), None)  # fmt: skip
+        told = f"{subject} was not allowed"
+        if view is not None and view.meaning:
+            told += f": {view.meaning[:1].lower()}{view.meaning[1:].rstrip('.')}"
+        clause = "" if record.clause is None else f"`{' '.join(record.clause.split())}`"
+        values = [f"{each.name} = {each.value}" for each in (() if view is None else view.reads) if clause]
+        if clause:
+            told += f" ({clause}{', with ' * bool(values)}{_listed(values, ', ')})"
+        return f"{told}."
 
     def _intact(self) -> str:
         report = self._report
@@ -208,6 +240,10 @@ class FlightSummary:
         return f"{first[:1].upper()}{first[1:]}.{more}"
 
 
+#: effects after which the vehicle may still fly
+_ALOFT: Final = ("not-landed", "stranded", "left")
+#: motions that end on the ground
+_DOWN: Final = frozenset({MotionKind.HOME, MotionKind.LAND})
 #: reasons of decisions that wait for a person, or waited in vain
 _ASKS: Final = frozenset({Reason.AWAITING_APPROVAL.value, Reason.APPROVAL_TIMED_OUT.value})
 

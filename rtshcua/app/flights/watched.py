@@ -73,7 +73,11 @@ class WatchedPage:
         with self._lock:
             if self._page is None:
                 found = self._report()
-                self._page = found.text if isinstance(found, Refusal) else page(found, live=found.verdict == "growing")
+                self._page = (
+                    refused_page(found.text)
+                    if isinstance(found, Refusal)
+                    else page(found, live=found.verdict == "growing")
+                )
             return self._page
 
     def _report(self) -> FlightReport | Refusal:

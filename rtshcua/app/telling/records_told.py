@@ -2,6 +2,7 @@
 
 import re
 from base64 import b64decode
+from collections.abc import Sequence
 from contextlib import suppress
 
 from rtshcua.adapters.utc import CLOCK
@@ -16,6 +17,7 @@ from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.witnessing.anchors import ANCHORED
+from rtshcua.model.flat.contract import Link
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.dispatcher import OBEYED
 from rtshcua.wire import statement
@@ -105,7 +107,7 @@ class Names:
 
     def step(self, step: int) -> str:
         """A step as it was written; empty where that is not known."""
-        return self._text(STEP, step, -1)
+        return self.text(STEP, step, -1)
 
     def tell(self, record: AnyRecord) -> str:
         """A record as one line of text."""
@@ -146,17 +148,36 @@ class Names:
             return ""
         if kind == FALLBACK_LINK and link == DEGRADE:
             return f"target of the degrade rule, at {step_words(step)}"
-        text = self._text(kind, step, link)
+        text = self.text(kind, step, link)
         number = number_of(link if kind == CONTINGENCY_LINK else step)  # a link by its place in the chain, from 1
         return f"{_KINDS[kind]} {number}{f' `{text}`' if text else ''}"
 
-    def _text(self, kind: int, step: int, link: int) -> str:
+    def motion(self, record: Effect) -> int | None:
+        """The kind of motion (`MotionKind`) of the command that an effect is about; None if that is not known."""
+        if self._bundle is None:
+            return None
+        contracts, steps = self._bundle.policy.contracts, self._bundle.mission.invocations
+        chain = self._chain(record.kind, record.step)
+        if record.kind == STEP:
+            return steps[record.step].plan.kind if 0 <= record.step < len(steps) else None
+        if record.link == DEGRADE:
+            return next((each.motion.kind for each in contracts if each.name == record.detail), None)
+        return contracts[chain[record.link].skill].motion.kind if 0 <= record.link < len(chain) else None
+
+    def _chain(self, kind: int, step: int) -> Sequence[Link]:
+        """The links of a step's fallback, or of the contingency."""
+        assert self._bundle is not None
+        steps = self._bundle.mission.invocations
+        if kind == FALLBACK_LINK and 0 <= step < len(steps):
+            return steps[step].contract.fallback
+        return self._bundle.policy.contingency
+
+    def text(self, kind: int, step: int, link: int) -> str:
+        """A step or a link as it was written; empty where that is not known."""
         if self._bundle is None:
             return ""
-        chain = self._bundle.policy.contingency
-        if kind == FALLBACK_LINK and 0 <= step < len(self._bundle.mission.invocations):
-            chain = self._bundle.mission.invocations[step].contract.fallback
         if kind != STEP:
+            chain = self._chain(kind, step)
             return chain[link].text if 0 <= link < len(chain) else ""
         steps = self._bundle.mission.invocations
         return words.call(self._bundle.policy, steps[step]) if 0 <= step < len(steps) else ""

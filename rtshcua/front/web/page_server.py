@@ -5,16 +5,18 @@ this machine sends that name as `Host`, and is refused. Nothing can be changed b
 """
 
 import secrets
+import socket
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from hashlib import sha256
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Final, NamedTuple
 
 _HOST: Final = "127.0.0.1"
-#: how long a client may take over its request, s
-_PATIENCE_S: Final = 10.0
+#: how long a client may take over its whole request, s
+_PATIENCE_S: Final = 5.0
 _MOST_CLIENTS: Final = 16
 #: how often the end is looked for, s
 _POLL_S: Final = 0.1
@@ -73,13 +75,23 @@ class _Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def process_request_thread(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
+        late = threading.Timer(_PATIENCE_S, _ended, (request,))
+        late.daemon = True
+        late.start()
         try:
             super().process_request_thread(request, client_address)
         finally:
+            late.cancel()
             self.free.release()
 
     def handle_error(self, request: object, client_address: object) -> None:
         """A client that goes away is no fault."""
+
+
+def _ended(request: socket.socket) -> None:
+    """End the connection of a client that is too slow."""
+    with suppress(OSError):
+        request.shutdown(socket.SHUT_RDWR)
 
 
 class _Handler(BaseHTTPRequestHandler):

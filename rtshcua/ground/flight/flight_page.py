@@ -110,6 +110,11 @@ def page(report: FlightReport, *, live: bool = False, tiles: str = "") -> str:
     )
 
 
+def refused_page(text: str) -> str:
+    """A page in place of one that cannot be made, which says why."""
+    return rendered(PACKAGE, "refused.html", text=text)
+
+
 @cache
 def script(name: str) -> str:
     """A script that ships."""

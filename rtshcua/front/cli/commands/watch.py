@@ -65,5 +65,6 @@ def watch(
             time.sleep(_EVERY_S)
             page.update()
     if as_json:
+        page.current()  # a closed log is verified, also if nobody looked
         out_json(json.dumps({"closed": page.closed, "verdict": page.verdict}))
     return ExitCode.OK

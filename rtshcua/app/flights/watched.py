@@ -17,7 +17,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.reading import LONGEST, read
 from rtshcua.evidence.records import Genesis
 from rtshcua.ground.flight.flight_content import FlightReport
-from rtshcua.ground.flight.flight_page import page
+from rtshcua.ground.flight.flight_page import page, refused_page
 
 
 def log_of_flight(given: Path, runs: Path) -> Path | Refusal:

@@ -29,7 +29,7 @@ def test_completed_flight_in_six_lines(completed: Path) -> None:
     assert "takeoff(altitude = 15 m)" in asked
     assert "version" in allowed
     assert "3 of 3 steps completed" in flew
-    assert ended == "The mission was completed."
+    assert ended.startswith("The mission was completed. It landed at ")
     assert intact.startswith("Yes: ")
     assert "witness" in unvouched
     assert (report.verdict, code) == ("verified", ExitCode.OK)
@@ -45,7 +45,8 @@ def test_flight_that_turned_home_says_why(turned: Path) -> None:
     ended = answers(report)[3]
     assert "Ended early" in ended
     assert "battery" in ended
-    assert "flew." in ended
+    assert "Then flew, from " in ended
+    assert "It landed at " in ended
     lanes = {each.lane for each in report.timeline}
     assert {"proposed", "compiled", "decided", "dispatched", "observed", "fallback"} <= lanes
     flown = [each for each in report.timeline if each.lane == "fallback" and each.until_us is not None]

@@ -1,5 +1,6 @@
 """What one pass over the records of a flight collects for its page, also while they are still written."""
 
+from base64 import b64decode
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
@@ -11,6 +12,7 @@ from rtshcua.app.flights.flight_reading import FlightRecords, telemetry_of
 from rtshcua.app.flights.flight_telemetry import TelemetryReading, thinning_of
 from rtshcua.app.logged_decision import LoggedDecision
 from rtshcua.app.prepared_mission import Subject, prepared
+from rtshcua.app.telling.documents_told import said
 from rtshcua.app.telling.people import People
 from rtshcua.app.telling.records_told import Names
 from rtshcua.app.wording import many
@@ -19,6 +21,8 @@ from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis
 from rtshcua.ground.flight.flight_content import DecisionView, GapView, ListedRecord
 from rtshcua.ground.flight.flown import Flight
 from rtshcua.model.flat.mission import Mission
+from rtshcua.wire.approval import ApprovalDocument
+from rtshcua.wire.untrusted import Untrusted
 
 #: the most records that are listed
 _MOST_RECORDS: Final = 2_000
@@ -35,6 +39,8 @@ class CollectedFlight:
         self.told: list[ListedRecord] = []
         #: what is wrong with the line at which a growing log breaks off; empty while nothing is
         self.flaw = ""
+        #: whether each recorded answer of a person grants, by its record; None if it makes no sense
+        self.answers: dict[int, bool | None] = {}
         self._left_out = 0
         self.log, self._sources = log, sources
         self._start_us = 0
@@ -90,6 +96,8 @@ class CollectedFlight:
                 self.decisions = DecisionWords(subject, self.names, self._start_us, places)
         elif isinstance(record, DecisionRecord | Effect) and self.decisions is not None:
             self.decisions.take(record)
+        if isinstance(record, Effect) and record.event == "approval":
+            self.answers[record.seq] = _granted(record)
         if len(self.told) >= _MOST_RECORDS:
             self._left_out += 1
         elif self.names is not None:
@@ -110,3 +118,12 @@ class CollectedFlight:
             yield GapView("page", f"{many(self.decisions.unexplained, 'decision')} are told without their values")
         if self._left_out:
             yield GapView("page", f"{many(self._left_out, 'record')} are not listed; `rtshcua show` lists all")
+
+
+def _granted(record: Effect) -> bool | None:
+    """Whether a recorded answer grants; None if it makes no sense."""
+    try:
+        body = said(b64decode(record.detail, validate=True)).body
+    except (ValueError, Untrusted):
+        return None
+    return bool(body.granted) if isinstance(body, ApprovalDocument) else None

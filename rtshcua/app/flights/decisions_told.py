@@ -146,7 +146,7 @@ class DecisionWords:
         for each in context_of(record).approvals:
             role = roles[each.role] if 0 <= each.role < len(roles) else f"role {each.role}"
             by = people.by_number.get(each.person)
-            told.append(f"{'granted' if each.granted else 'refused'} as {role}{f' by {by}' if by else ''}")
+            told.append(f"{'granted' if each.granted else 'refused'} as `{role}`{f' by `{by}`' if by else ''}")
         return tuple(dict.fromkeys(told))
 
 

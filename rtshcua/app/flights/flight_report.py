@@ -10,7 +10,7 @@ from rtshcua.adapters.store.verification import Progress
 from rtshcua.app.autopilot_bindings import roots_of, trusted_bindings
 from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.flights.flight_told import flight_told
-from rtshcua.app.flights.redaction import Redaction, may_stay
+from rtshcua.app.flights.redaction import Redaction, bare_flight, bare_report, may_stay
 from rtshcua.app.logs import report_code
 from rtshcua.app.pin import Pin
 from rtshcua.app.verify_log import VerifyRequest, verify_log
@@ -56,14 +56,20 @@ def flight_report(request: FlightReportRequest, progress: Progress = lambda _: N
     flight = collected.flight()
     if isinstance(flight, Refusal):
         return flight
+    redaction, found = None, audit.report
+    if request.removed:
+        redaction = Redaction(flight, collected.persons, request.removed, (collected.mission(),))
+        found, flight = bare_report(found), bare_flight(flight)
     roots = roots_of(None if audit.basis is None else audit.basis.root, request.pin.roots)
     told = flight_told(
-        audit.report, flight, collected, trusted_bindings(audit.report, request.log, roots),
+        found, flight, collected, trusted_bindings(audit.report, request.log, roots),
         made_at_us=request.made_at_us, pinned=f"root key `{request.pin.key.hex()}`", details=not request.removed,
     )  # fmt: skip
-    redaction = Redaction(flight, collected.persons, request.removed) if request.removed else None
     if redaction is not None:
         told = redaction.report(told, flight)
+        left = redaction.left_in(told)
+        if left is not None:
+            return left
     return ReportedFlight(_with_log(told, request, audit.report.records, size), report_code(audit.report), redaction)
 
 

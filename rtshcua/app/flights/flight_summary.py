@@ -2,13 +2,11 @@
 what nothing vouches for.
 """
 
-from base64 import b64decode
 from collections.abc import Iterator, Sequence
 from typing import Final
 
 from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.telling import words
-from rtshcua.app.telling.documents_told import said
 from rtshcua.app.wording import many
 from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect
 from rtshcua.evidence.report import LogReport, LogVerdict
@@ -18,9 +16,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.outcome import Reason
 from rtshcua.model.step_number import number_of, step_words
 from rtshcua.onboard.runtime.link import STOOD_STILL
-from rtshcua.wire.approval import ApprovalDocument
 from rtshcua.wire.request import STEP
-from rtshcua.wire.untrusted import Untrusted
 
 #: how many steps, answers or replacements a line names
 _NAMED: Final = 4
@@ -117,7 +113,7 @@ class FlightSummary:
         }
         parts = [f"{told}."]
         for granted, what in ((True, "Granted by signature"), (False, "Refused by signature")):
-            some = [f"{step_words(each.step)}{self._who(each)}" for each in answers if _granted(each) is granted]
+            some = [f"{step_words(each.step)}{self._who(each)}" for each in answers if self._collected.answers.get(each.seq) is granted]
             if some:
                 parts.append(f"{what}: {_listed(some, '; ')}.")
         if waited - answered:
@@ -246,15 +242,6 @@ _ALOFT: Final = ("not-landed", "stranded", "left")
 _DOWN: Final = frozenset({MotionKind.HOME, MotionKind.LAND})
 #: reasons of decisions that wait for a person, or waited in vain
 _ASKS: Final = frozenset({Reason.AWAITING_APPROVAL.value, Reason.APPROVAL_TIMED_OUT.value})
-
-
-def _granted(record: Effect) -> bool | None:
-    """Whether a recorded answer grants; None if it makes no sense."""
-    try:
-        body = said(b64decode(record.detail, validate=True)).body
-    except (ValueError, Untrusted):
-        return None
-    return bool(body.granted) if isinstance(body, ApprovalDocument) else None
 
 
 def _listed(texts: Sequence[str], between: str) -> str:

@@ -4,7 +4,6 @@ the same bytes.
 """
 
 import json
-import re
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
@@ -119,14 +118,6 @@ def refused_page(text: str) -> str:
 def script(name: str) -> str:
     """A script that ships."""
     return (files(PACKAGE) / "templates" / name).read_text(encoding="utf-8")
-
-
-@cache
-def own_words() -> frozenset[str]:
-    """The words that every page has, whatever the flight."""
-    folder = files(PACKAGE) / "templates"
-    texts = (each.read_text(encoding="utf-8") for each in folder.iterdir() if each.name.endswith((".html", ".js")))
-    return frozenset(word for text in texts for word in re.findall(r"\w+", text))
 
 
 def origin_of(tiles: str) -> str:

@@ -15,7 +15,7 @@ from rtshcua.adapters.store.writing import make_folder, replace_inside
 from rtshcua.app.documents import no_log
 from rtshcua.app.files import overwriting_a_source
 from rtshcua.app.flights.flight_report import FlightReportRequest, ReportedFlight, flight_report
-from rtshcua.app.flights.redaction import REDACTABLE, redaction_of
+from rtshcua.app.flights.redaction import REDACTABLE, Redaction, redaction_of
 from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_meant
 from rtshcua.app.pin import trusted
 from rtshcua.app.wording import moment, utc
@@ -36,7 +36,7 @@ Output = Annotated[
     typer.Option(
         "-o", "--output", metavar="FILE|FOLDER",
         help="the page, or for several flights the folder to write "
-        "[default: RUN.html or `logbook`; standard output if piped]",
+        "[default: RUN.html or `logbook`, flight-1.html if redacted; standard output if piped]",
     ),
 ]  # fmt: skip
 Root = Annotated[
@@ -94,7 +94,7 @@ def report(
         if not is_log(log):
             return fail(ExitCode.INPUT, *no_log(log, log, NO_LOG_HELP))
     request = FlightReportRequest(logs[0], pinned, tuple(sources or (Path(),)), made_at, removed)
-    target = _target(output, logs, as_json=as_json)
+    target = _target(output, logs, redacted=bool(removed), as_json=as_json)
     if isinstance(target, Refusal):
         return refuse(target)
     return (
@@ -113,13 +113,13 @@ def _wrong_tiles(address: str) -> Refusal | None:
     return Refusal("usage", f"`{address}` is not an address of map tiles", help, code=ExitCode.USAGE)
 
 
-def _target(output: Path | None, logs: Sequence[Path], *, as_json: bool) -> Path | Refusal | None:
+def _target(output: Path | None, logs: Sequence[Path], *, redacted: bool, as_json: bool) -> Path | Refusal | None:
     """The file or folder to write; None for standard output."""
     several = len(logs) > 1
     if output is None:
         if as_json or (not several and not sys.stdout.isatty()):
             return None
-        output = Path("logbook") if several else Path(_name(logs[0]) + _PAGE)
+        output = Path("logbook") if several else Path(_name(logs[0], 1, redacted=redacted) + _PAGE)
     elif str(output) == "-" and not several:
         return None
     if several:
@@ -127,7 +127,7 @@ def _target(output: Path | None, logs: Sequence[Path], *, as_json: bool) -> Path
             return Refusal("output", f"`{output}` is a file; several flights make a folder of pages")
         return output
     if output.is_dir():
-        output /= _name(logs[0]) + _PAGE
+        output /= _name(logs[0], 1, redacted=redacted) + _PAGE
     if output.exists() and not output.is_file():
         return Refusal("output", f"`{output}` is not a regular file, and is not overwritten by a page")
     if not output.parent.is_dir():
@@ -135,8 +135,10 @@ def _target(output: Path | None, logs: Sequence[Path], *, as_json: bool) -> Path
     return overwriting_a_source(output, logs, "a page") or output
 
 
-def _name(log: Path) -> str:
-    """The name of a page: that of the run folder, or of the log."""
+def _name(log: Path, number: int, *, redacted: bool) -> str:
+    """The name of a page: that of the run folder, or of the log; of a redacted page only a number."""
+    if redacted:
+        return f"flight-{number}"
     folder = log.resolve().parent.name
     return folder if log.name == "log.jsonl" and folder else log.stem
 
@@ -165,13 +167,14 @@ def _several(
     if folder is not None:
         make_folder(folder)
     entries: list[LogbookEntry] = []
+    redactions: list[Redaction] = []
     code, names = ExitCode.OK, set[str]()
     for number, log in enumerate(logs, 1):
         found = _reported(request._replace(log=log))
         if isinstance(found, Refusal):
             code = code or refuse(found)
             continue
-        name = _name(log)
+        name = _name(log, number, redacted=bool(request.removed))
         name = name if name not in names else f"{name}-{number}"
         names.add(name)
         page = None if folder is None else folder / (name + _PAGE)
@@ -184,10 +187,15 @@ def _several(
         else:
             out(f"{number} of {len(logs)}: {name}: {told.verdict}, {told.ending}")
         entries.append(LogbookEntry(name + _PAGE, told.without_log()))
+        redactions += [found.redaction] if found.redaction is not None else []
         code = code or found.code
     if folder is not None:
         made_by = entries[0].flight.made_by if entries else "rtshcua"
-        replace_inside(folder / _INDEX, logbook_page(entries, utc(request.made_at_us), made_by).encode("utf-8"))
+        text = logbook_page(entries, utc(request.made_at_us), made_by)
+        left = next((left for each in redactions if (left := each.left(text)) is not None), None)
+        if left is not None:
+            return refuse(left)
+        replace_inside(folder / _INDEX, text.encode("utf-8"))
         say(f"{len(entries)} flights: open {folder / _INDEX}")
     return code
 

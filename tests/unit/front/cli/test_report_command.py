@@ -98,6 +98,29 @@ def test_redacted_page(runs: Path) -> None:
     assert "quad-07" not in text
 
 
+def test_redacted_pages_and_their_logbook_have_numbers_for_names(
+    runs: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["report", str(runs), "-o", "pages", "--redact", "position,names", *ROOT, *AT]) == ExitCode.OK
+    assert sorted(each.name for each in (here / "pages").iterdir()) == ["flight-1.html", "flight-2.html", "index.html"]
+    index = Path("pages/index.html").read_text(encoding="utf-8")
+    assert 'href="flight-1.html"' in index
+    assert not any(gone in index for gone in ("quad-07", "inspect_bridge_a", "bridge"))
+    assert "left out" in index
+    monkeypatch.setattr(sys, "stdout", Terminal())
+    assert main(["report", str(runs / "a"), "--redact", "names", *ROOT, *AT]) == ExitCode.OK
+    assert Path("flight-1.html").is_file()
+
+
+def test_logbook_with_something_left_is_not_written(
+    runs: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rtshcua.ground.flight.logbook_page.logbook_page", lambda *_: "<p>over Bridge-A</p>")
+    assert main(["report", str(runs), "-o", "pages", "--redact", "names", *ROOT]) == ExitCode.FAULT
+    assert "bridge_a" in capsys.readouterr().err
+    assert not Path("pages/index.html").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [

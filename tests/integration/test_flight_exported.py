@@ -12,8 +12,10 @@ import pytest
 from reference.forgery import edit
 from reference.kept_frames import kept
 from reference.low_source import INSPECTION, low_source
+from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.programs import compile_sources
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import app
 from rtshcua.mavlink import tlog
 from rtshcua.model.flat.mission import Mission
@@ -80,6 +82,14 @@ def test_the_plan_is_the_mission_with_the_steps_that_replaced_others(
     found = json.loads(words.read_text(encoding="utf-8"))["features"]
     decisions = [each["properties"]["words"] for each in found if each["properties"]["kind"] == "decision"]
     assert any("`hover(time = 5 s)`" in each for each in decisions)
+
+
+def test_steps_that_were_replaced_were_in_force(replaced: tuple[Path, Mission, Sign]) -> None:
+    flight = read_flight(replaced[0] / "log.jsonl")
+    assert not isinstance(flight, Refusal)
+    now = flight.mission.invocations
+    assert set(map(msgspec.json.encode, now)) < set(map(msgspec.json.encode, flight.steps))
+    assert len(flight.steps) > len(now)
 
 
 def test_a_forged_replacement_is_refused(

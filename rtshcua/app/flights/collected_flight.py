@@ -43,7 +43,6 @@ class CollectedFlight:
         self.answers: dict[int, bool | None] = {}
         self._left_out = 0
         self.log, self._sources = log, sources
-        self._start_us = 0
         self._reading: TelemetryReading | None = None
 
     def _begin_telemetry(self, genesis: Genesis) -> None:
@@ -65,7 +64,8 @@ class CollectedFlight:
 
     def flight(self) -> Flight | Refusal:
         """The flight so far."""
-        return self.records.flight(self.log, None if self._reading is None else self._reading.telemetry())
+        heard = None if self._reading is None else self._reading.telemetry(self.records.times.lasted_us)
+        return self.records.flight(self.log, heard)
 
     @property
     def persons(self) -> tuple[str, ...]:
@@ -85,23 +85,22 @@ class CollectedFlight:
 
     def take(self, record: AnyRecord) -> None:
         """Take the next valid record."""
-        self.records.take(record)
+        t_us = self.records.take(record)
         self.cause.take(record)  # the names follow it
         if isinstance(record, Genesis):
-            self._start_us = record.at_us
             self._begin_telemetry(record)
             subject = self.cause.in_force
             if subject is not None and self.names is not None:
                 places = ClausePlaces(subject.policy.policy, subject.mission, self._sources)
-                self.decisions = DecisionWords(subject, self.names, self._start_us, places)
+                self.decisions = DecisionWords(subject, self.names, places)
         elif isinstance(record, DecisionRecord | Effect) and self.decisions is not None:
-            self.decisions.take(record)
+            self.decisions.take(record, t_us)
         if isinstance(record, Effect) and record.event == "approval":
             self.answers[record.seq] = _granted(record)
         if len(self.told) >= _MOST_RECORDS:
             self._left_out += 1
         elif self.names is not None:
-            self.told.append(ListedRecord(record.seq, record.at_us - self._start_us, self.names.tell(record).strip()))
+            self.told.append(ListedRecord(record.seq, t_us, self.names.tell(record).strip()))
 
     def mission(self) -> Mission:
         """The mission of the bundle, before any replacement; call it after the first record."""

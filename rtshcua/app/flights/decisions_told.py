@@ -31,8 +31,8 @@ _MOST_READ: Final = 20
 class DecisionWords:
     """Collects the decisions of a log; equal ones in a row, such as those while a step waits, are one."""
 
-    def __init__(self, subject: Subject, names: Names, start_us: int, places: ClausePlaces) -> None:
-        self._subject, self._names, self._start_us = subject, names, start_us
+    def __init__(self, subject: Subject, names: Names, places: ClausePlaces) -> None:
+        self._subject, self._names = subject, names
         #: the sources of steps from a number on: those of the bundle, and of each replacement
         self._sources = [(0, places)]
         self._told: list[DecisionView] = []
@@ -47,19 +47,16 @@ class DecisionWords:
         """The decisions in words, in order."""
         return tuple(self._told)
 
-    def take(self, record: DecisionRecord | Effect) -> None:
-        """Take the next record, after `Names.follow`."""
+    def take(self, record: DecisionRecord | Effect, t_us: int) -> None:
+        """Take the next record, at a time since the first one, after `Names.follow`."""
         if isinstance(record, Effect):
             if record.event == "replacement":
                 self._replace(record)
             elif record.event == "repeated" and self._ref == record.ref and record.detail.isdecimal():
                 last = self._told[-1]
-                self._told[-1] = last._replace(
-                    repeats=last.repeats + int(record.detail[:9]), until_us=record.at_us - self._start_us
-                )
+                self._told[-1] = last._replace(repeats=last.repeats + int(record.detail[:9]), until_us=t_us)
             return
         key = (record.kind, record.step, record.link, record.outcome, record.reason, record.clause, record.target)
-        t_us = record.at_us - self._start_us
         if key == self._last and record.outcome != "allow":
             last = self._told[-1]
             self._told[-1] = last._replace(repeats=last.repeats + 1, until_us=t_us)

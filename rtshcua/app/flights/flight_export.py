@@ -10,6 +10,7 @@ from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, TELEMETRY
 from rtshcua.app.documents import kind_of, no_log
 from rtshcua.app.flights.flight_reading import read_flight
+from rtshcua.app.flights.telemetry_told import doubts
 from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of
 from rtshcua.app.pin import trusted
 from rtshcua.app.sidecar_files import run_folder
@@ -29,6 +30,7 @@ from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.flight.export import CSV, FORMATS, GEOJSON, GPX, KML, MCAP, PLAN, TLOG
 from rtshcua.ground.flight.export.exported import FlightExport, ToldRecord, with_usable_track
 from rtshcua.ground.flight.flown import Flight
+from rtshcua.ground.flight.track import home_of
 from rtshcua.wire.request import STEP
 
 _EVIDENCE: Final = (SOURCE, SPECIFICATION, BUNDLE, DOCUMENT, KEY, PROOF, FLIGHT_LOG)
@@ -115,6 +117,8 @@ def export(request: ExportRequest) -> ExportedFile | Refusal:
     if dropped and request.format not in (PLAN, TLOG):
         warnings.append(f"left out {many(dropped, 'position')} with an impossible place or time")
     damaged = None if flight.telemetry is None else flight.telemetry.damaged
+    if flight.telemetry is not None and request.format not in (PLAN, TLOG):
+        warnings += [f"the telemetry: {each}" for each in doubts(flight.telemetry)]
     if damaged is not None and request.format not in (PLAN, TLOG):
         warnings.append(f"the telemetry is damaged from byte {damaged} on; what follows was not read")
     return ExportedFile(made.data, made.points, made.datum, status, tuple(warnings))
@@ -189,9 +193,7 @@ def _told(log: Path, flight: Flight) -> tuple[ToldRecord, ...]:
 
 def _told_record(record: DecisionRecord | Effect, flight: Flight, names: Names) -> ToldRecord:
     words = " ".join(names.tell(record).removeprefix("· ").split())
-    t_us, step = flight.since_begun(record.at_us), record.step if record.kind >= STEP else -1
-    if t_us < 0:  # monotonic time restarts after a crash
-        t_us = record.utc_us - flight.genesis.utc_us
+    t_us, step = flight.since_begun(record), record.step if record.kind >= STEP else -1
     if isinstance(record, DecisionRecord):
         return ToldRecord(t_us, True, record.outcome, record.reason, step, words)
     return ToldRecord(t_us, False, record.event, "", step, words)
@@ -212,7 +214,6 @@ def _made(format: str, exported: FlightExport, log: Path) -> _Made | Refusal:
 def _text_format(format: str, exported: FlightExport) -> tuple[Callable[[FlightExport], bytes], str]:
     """The function that makes a format, and its datum."""
     from rtshcua.ground.flight.export import csv_table, geojson_file, gpx, kml
-    from rtshcua.ground.flight.export.exported import home_of
 
     if format == KML:
         return kml.kml, kml.datum(home_of(exported.flight))
@@ -228,7 +229,6 @@ def _plan(exported: FlightExport) -> _Made:
     from rtshcua.adapters.vehicle.fence import fence_of
     from rtshcua.adapters.vehicle.flavour import FenceHabits
     from rtshcua.ground.flight.export import qgc_plan
-    from rtshcua.ground.flight.export.exported import home_of
     from rtshcua.mavlink.enums import MAV_FRAME_GLOBAL
 
     # the autopilot is not known: what each of them would make narrower than the policy is left out

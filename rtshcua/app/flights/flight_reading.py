@@ -9,6 +9,7 @@ import msgspec
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import TELEMETRY
+from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
 from rtshcua.app.documents import Claimed, claimed, replaced
 from rtshcua.app.flights.flight_telemetry import read_telemetry
 from rtshcua.app.logs import CUT_AT_FIRST
@@ -19,7 +20,8 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Effect, Genesis
 from rtshcua.ground.flight.flown import Flight, FlightTelemetry
-from rtshcua.model.flat.mission import Mission
+from rtshcua.ground.flight.log_times import LogTimes
+from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.untrusted import Untrusted
 
@@ -32,22 +34,28 @@ class FlightRecords:
         #: the bundle in the first record, or why it cannot be read
         self.bundle: Claimed | Untrusted | None = None
         self._mission: Mission | None = None
+        self._steps: list[Invocation] = []  # all that were ever in force
         self._records: list[AnyRecord] = []
+        self.times = LogTimes()
 
-    def take(self, record: AnyRecord) -> None:
-        """Take the next valid record."""
+    def take(self, record: AnyRecord) -> int:
+        """Take the next valid record; return its time since the first one."""
         if isinstance(record, Genesis):
             self.genesis = record
             try:
-                self.bundle = claimed(b64decode(record.bundle))
+                self.bundle = _readable(claimed(b64decode(record.bundle)))
                 self._mission = self.bundle.mission
+                self._steps += self._mission.invocations
             except ValueError as error:  # `Untrusted` too
                 self.bundle = error if isinstance(error, Untrusted) else Untrusted("malformed", "it is not base64")
             record = msgspec.structs.replace(record, bundle="", root="")
         elif isinstance(record, Effect) and record.event == "replacement" and self._mission is not None:
             with suppress(Untrusted):  # which verification names
+                before = self._mission.invocations
                 self._mission = replaced(record.detail, self._mission)
+                self._steps += [each for each in self._mission.invocations if each not in before]
         self._records.append(record)
+        return self.times.take(record)
 
     def policy(self) -> Policy | None:
         """The policy of the bundle; None before the first record, or if it cannot be read."""
@@ -61,7 +69,19 @@ class FlightRecords:
         if not isinstance(bundle, Claimed) or mission is None:
             text = f"`{log}`: the bundle in its first record cannot be read: {bundle}"
             return Refusal("genesis/bundle", text, "", ExitCode.EVIDENCE)
-        return Flight(genesis, bundle.policy, mission, tuple(self._records), telemetry)
+        records, times = tuple(self._records), self.times
+        return Flight(
+            genesis, bundle.policy, mission, records, telemetry, times.segments, times.lasted_us, tuple(self._steps)
+        )
+
+
+def _readable(bundle: Claimed) -> Claimed:
+    """A bundle whose signals this program can read. Raises `Untrusted`."""
+    try:
+        Telemetry(bundle.policy)
+    except UnknownSource as error:
+        raise Untrusted("malformed", str(error)) from None
+    return bundle
 
 
 def telemetry_of(log: Path) -> Path | None:
@@ -84,5 +104,5 @@ def read_flight(log: Path) -> Flight | Refusal:
     path, policy = telemetry_of(log), records.policy()
     telemetry = None
     if path is not None and policy is not None and records.genesis is not None:
-        telemetry = read_telemetry(path, policy, records.genesis.utc_us)
+        telemetry = read_telemetry(path, policy, records.genesis.utc_us, records.times.lasted_us)
     return records.flight(log, telemetry)

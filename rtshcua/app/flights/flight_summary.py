@@ -113,7 +113,8 @@ class FlightSummary:
         }
         parts = [f"{told}."]
         for granted, what in ((True, "Granted by signature"), (False, "Refused by signature")):
-            some = [f"{step_words(each.step)}{self._who(each)}" for each in answers if self._collected.answers.get(each.seq) is granted]
+            meant = (each for each in answers if self._collected.answers.get(each.seq) is granted)
+            some = [f"{step_words(each.step)}{self._who(each)}" for each in meant]
             if some:
                 parts.append(f"{what}: {_listed(some, '; ')}.")
         if waited - answered:
@@ -128,7 +129,7 @@ class FlightSummary:
 
     def _flew(self) -> str:
         steps = len(self._flight.mission.invocations)
-        lasted_us = self._flight.since_begun(self._flight.records[-1].at_us)
+        lasted_us = self._flight.lasted_us
         told = (
             f"{len(self.done)} of {many(steps, 'step')} completed in {words.duration(lasted_us // 100_000 * 100_000)}"
         )
@@ -149,11 +150,12 @@ class FlightSummary:
         if self._report is None:
             told += self._stopped()
         if cause is not None:
-            told += f" At {_seconds(flight.since_begun(cause.at_us))} {self._cause(flight.records[cause.seq])}"
+            record = flight.records[cause.seq]
+            told += f" At {_seconds(flight.since_begun(record))} {self._cause(record)}"
         after = [each for each in self._effects("dispatched") if cause is not None and each.seq > cause.seq]
         flown = [self._link(each) for each in after if each.kind != STEP]
         if flown:
-            told += f" Then flew, from {_seconds(flight.since_begun(after[0].at_us))} on: {_listed(flown, ', then ')}."
+            told += f" Then flew, from {_seconds(flight.since_begun(after[0]))} on: {_listed(flown, ', then ')}."
         return told + self._came_down()
 
     def _link(self, record: Effect) -> str:
@@ -165,7 +167,7 @@ class FlightSummary:
         """Whether the vehicle was seen to land at the end."""
         told, motion = "", None
         for each in self._effects("dispatched", "succeeded", "landed", *_ALOFT):
-            when = _seconds(self._flight.since_begun(each.at_us))
+            when = _seconds(self._flight.since_begun(each))
             if each.event == "dispatched":
                 told, motion = "", self._names.motion(each)
             elif each.event in _ALOFT:

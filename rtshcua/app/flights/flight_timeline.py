@@ -78,15 +78,15 @@ class _Events:
             if isinstance(record, DecisionRecord):
                 told = " ".join(self._names.tell(record).split())
                 lane = "decided" if record.kind == STEP else "fallback"
-                yield TimelineEvent(lane, flight.since_begun(record.at_us), None, record.outcome, told, record.seq)
+                yield TimelineEvent(lane, flight.since_begun(record), None, record.outcome, told, record.seq)
             elif isinstance(record, Effect):
                 yield from self._of(record)
-        end_us = flight.since_begun(flight.records[-1].at_us)
+        end_us = flight.lasted_us
         for began_us, record in self._running.values():
             yield self._ran(record, began_us, end_us, "its end is not recorded")
 
     def _of(self, record: Effect) -> Iterator[TimelineEvent]:
-        t_us = self._flight.since_begun(record.at_us)
+        t_us = self._flight.since_begun(record)
         if record.event == "dispatched":
             self._running[record.token] = t_us, record
         elif record.token in self._running and record.event != OBEYED:  # it has the token of what it ends

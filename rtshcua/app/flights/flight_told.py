@@ -2,11 +2,7 @@
 telemetry.
 """
 
-from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from math import isqrt
-from typing import Final
 
 from rtshcua import __version__
 from rtshcua.app.autopilot_bindings import agreed, apart, described
@@ -14,6 +10,7 @@ from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.flights.flight_summary import FlightSummary
 from rtshcua.app.flights.flight_timeline import timeline
 from rtshcua.app.flights.signal_limits import signal_limits
+from rtshcua.app.flights.telemetry_told import doubts, silences
 from rtshcua.app.wording import many, true_to, utc
 from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.records import Close
@@ -26,12 +23,10 @@ from rtshcua.ground.flight.flight_content import (
     SignalCurve,
     TrackView,
 )
-from rtshcua.ground.flight.flown import Flight, FlightTelemetry
+from rtshcua.ground.flight.flown import Flight
+from rtshcua.ground.flight.track import distance, home_of, place_at
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.wire.autopilot_binding import AutopilotBinding
-
-#: the most silences that are told
-_MOST_SILENCES: Final = 20
 
 
 def flight_told(
@@ -43,7 +38,7 @@ def flight_told(
     """
     genesis, last = flight.genesis, flight.records[-1]
     ending = last.ending if isinstance(last, Close) else "flying" if report is None else "not closed"
-    track, elevation = _track(flight)
+    track = _track(flight)
     summary = FlightSummary(report, flight, collected, track, ending=ending, made_at_us=made_at_us, details=details)
     assert collected.names is not None
     return FlightReport(
@@ -54,26 +49,26 @@ def flight_told(
         vehicle=genesis.vehicle,
         begun=utc(genesis.utc_us),
         begun_utc_us=genesis.utc_us,
-        lasted_us=flight.since_begun(last.at_us),
+        lasted_us=flight.lasted_us,
         ending=ending,
         steps_done=len(summary.done),
         steps=len(flight.mission.invocations),
         highest=None if track is None else max(each.above_home for each in track.points),
-        distance=None if track is None else _distance(track.places),
+        distance=None if track is None else distance(track.points, track.places),
         verdict="growing" if report is None else report.verdict.value,
         pinned=pinned,
         origin=origin_of(genesis.vehicle, genesis.boot),
         root="" if report is None else report.root.hex(),
         summary=summary.lines(),
         projection=flight.policy.projection,
-        site=site_of(flight.policy, elevation),
+        site=site_of(flight.policy, home_of(flight).above_sea),
         way=way_of(flight.mission),
         track=track,
         bound=tuple(map(_bound, bindings)) if details else (),
         timeline=timeline(flight, collected.mission(), collected.names, details=details),
-        decisions=tuple(each._replace(where=_where(track, each.t_us)) for each in collected.decisions_told()),
+        decisions=tuple(each._replace(where=_where(flight, track, each.t_us)) for each in collected.decisions_told()),
         signals=_signals(flight),
-        gaps=(*_gaps_of_log(flight, report), *_gaps_of_telemetry(flight.telemetry), *collected.gaps()),
+        gaps=(*_gaps_of_log(flight, report), *_gaps_of_telemetry(flight), *collected.gaps()),
         proven=() if report is None else tuple(claim.text for claim in report.proven),
         unproven=() if report is None else tuple(claim.text for claim in report.unproven),
         records=tuple(collected.told),
@@ -83,27 +78,18 @@ def flight_told(
     )
 
 
-def _track(flight: Flight) -> tuple[TrackView | None, int | None]:
-    """The flown track, and the height of home above mean sea level."""
+def _track(flight: Flight) -> TrackView | None:
     telemetry = flight.telemetry
     if telemetry is None or not telemetry.track:
-        return None, None
-    first = telemetry.track[0]
-    elevation = first.above_sea - first.above_home if telemetry.home is None else telemetry.home.above_sea
-    places = tuple(flight.local(each.latitude, each.longitude) for each in telemetry.track)
-    return TrackView(telemetry.track, places), elevation
-
-
-def _where(track: TrackView | None, t_us: int) -> tuple[int, int] | None:
-    if track is None:
         return None
-    at = min(bisect_left(track.points, t_us, key=lambda each: each.t_us), len(track.points) - 1)
-    return track.places[at]
+    places = tuple(flight.local(each.latitude, each.longitude) for each in telemetry.track)
+    return TrackView(telemetry.track, places)
 
 
-def _distance(places: Sequence[tuple[int, int]]) -> int:
-    """The length of a track over ground, mm."""
-    return sum(isqrt((x1 - x0) ** 2 + (y1 - y0) ** 2) for (x0, y0), (x1, y1) in pairwise(places))
+def _where(flight: Flight, track: TrackView | None, t_us: int) -> tuple[int, int] | None:
+    """Where the vehicle was; None where no report tells."""
+    known = None if track is None else place_at(track.points, t_us)
+    return None if known is None else flight.local(known.point.latitude, known.point.longitude)
 
 
 def _bound(binding: AutopilotBinding) -> AutopilotLogView:
@@ -115,7 +101,7 @@ def _bound(binding: AutopilotBinding) -> AutopilotLogView:
 def _signals(flight: Flight) -> tuple[SignalCurve, ...]:
     if flight.telemetry is None:
         return ()
-    limits = signal_limits(flight.policy, flight.mission)
+    limits = signal_limits(flight.policy, flight.steps)
     slots = {each.name: each.slot for each in flight.policy.signals if each.kind != POSITION}
     return tuple(SignalCurve(each, limits.get(slots[each.name], ())) for each in flight.telemetry.signals)
 
@@ -131,17 +117,15 @@ def _gaps_of_log(flight: Flight, report: LogReport | None) -> Iterator[GapView]:
         yield GapView("records", f"nothing was recorded for {_seconds(gap.us)} before record {gap.record}")
 
 
-def _gaps_of_telemetry(telemetry: FlightTelemetry | None) -> Iterator[GapView]:
+def _gaps_of_telemetry(flight: Flight) -> Iterator[GapView]:
+    telemetry = flight.telemetry
     if telemetry is None:
         yield GapView("telemetry", "there is none: no track, no signals")
         return
     if telemetry.damaged is not None:
         yield GapView("telemetry", f"the file breaks off at octet {telemetry.damaged}")
-    for silence in telemetry.silences[:_MOST_SILENCES]:
-        between = f"from {_seconds(silence.from_us)} to {_seconds(silence.to_us)}"
-        yield GapView("frames", f"no frame of the autopilot {between}")
-    if len(telemetry.silences) > _MOST_SILENCES:
-        yield GapView("frames", f"and {len(telemetry.silences) - _MOST_SILENCES} more silences")
+    yield from (GapView("telemetry", each) for each in doubts(telemetry))
+    yield from (GapView("frames", each) for each in silences(telemetry, flight.lasted_us))
     silent = [each.name for each in telemetry.signals if all(value is None for _, value in each.points)]
     if silent:
         named = ", ".join(f"`{name}`" for name in silent)

@@ -156,9 +156,8 @@ class Redaction:
     def report(self, report: FlightReport, flight: Flight) -> FlightReport:
         """The report without what is removed."""
         kept = {name for name, each in self._signals.items() if not self.position or _no_place(each)}
-        begun_us = flight.genesis.at_us
         report = report._replace(
-            records=tuple(_listed(each, begun_us) for each in flight.records[: len(report.records)]),
+            records=tuple(_listed(each, flight.since_begun(each)) for each in flight.records[: len(report.records)]),
             redacted=self._removed,
             decisions=tuple(each._replace(reads=tuple(self._reads(each, kept))) for each in report.decisions),
             signals=tuple(each for each in report.signals if each.series.name in kept),
@@ -297,7 +296,7 @@ def _no_place(signal: Signal) -> bool:
     )
 
 
-def _listed(record: AnyRecord, start_us: int) -> ListedRecord:
+def _listed(record: AnyRecord, t_us: int) -> ListedRecord:
     """A record without its details."""
     if isinstance(record, DecisionRecord):
         told = f"decision: {record.outcome}, {record.reason}"
@@ -305,7 +304,7 @@ def _listed(record: AnyRecord, start_us: int) -> ListedRecord:
         told = f"effect: {record.event}"
     else:
         told = record.type
-    return ListedRecord(record.seq, record.at_us - start_us, told)
+    return ListedRecord(record.seq, t_us, told)
 
 
 @cache

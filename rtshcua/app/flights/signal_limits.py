@@ -1,21 +1,21 @@
 """The limits that a policy and a mission compare each signal with, for the drawings of a flight's signals."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rtshcua.decision.tree import AtMost, Both, CodeScope, Either, Negation, Node, parse, scope_of
 from rtshcua.ground.flight.flight_content import SignalLimit
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.mission import Mission
-from rtshcua.model.flat.policy import Policy, RuleKind
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 
 
-def signal_limits(policy: Policy, mission: Mission) -> dict[int, tuple[SignalLimit, ...]]:
+def signal_limits(policy: Policy, steps: Sequence[Invocation]) -> dict[int, tuple[SignalLimit, ...]]:
     """The limits by state slot: of a comparison of one signal with a constant, the side on which the condition that has
-    to hold is false. Conditions of skills that the mission does not have are left out.
+    to hold is false. `steps` are all that were ever in force; conditions of skills that none of them has are left out.
     """
     found: dict[int, dict[tuple[int, bool], SignalLimit]] = {}
     scope = scope_of(policy)
-    for clause, holds, told, of in _clauses(policy, mission, scope):
+    for clause, holds, told, of in _clauses(policy, steps, scope):
         node = parse(clause.code, of)
         if isinstance(node, str):
             continue
@@ -25,10 +25,13 @@ def signal_limits(policy: Policy, mission: Mission) -> dict[int, tuple[SignalLim
     return {slot: tuple(limits.values()) for slot, limits in found.items()}
 
 
-def _clauses(policy: Policy, mission: Mission, scope: CodeScope) -> Iterator[tuple[Clause, bool, str, CodeScope]]:
-    """Yield conditions, whether they have to hold, whose they are, and their scope."""
-    skills = {each.skill for each in mission.invocations}
-    for one in mission.invocations:
+def _clauses(
+    policy: Policy, steps: Sequence[Invocation], scope: CodeScope
+) -> Iterator[tuple[Clause, bool, str, CodeScope]]:
+    """Yield conditions, whether they have to hold or must not hold, whose they are, and their scope."""
+    skills = {each.skill for each in steps}
+    permits = [each for each in policy.rules if each.kind == RuleKind.PERMIT]
+    for one in steps:
         contract = one.contract
         for clause in (*contract.require, *contract.assume, *contract.maintain):
             yield clause, True, contract.name, scope.about(contract)
@@ -37,13 +40,24 @@ def _clauses(policy: Policy, mission: Mission, scope: CodeScope) -> Iterator[tup
         if rule.when is not None and about and all(0 <= at < len(policy.contracts) for at in about):
             of = scope.about(*(policy.contracts[at] for at in rule.skills))
             kind = RuleKind(rule.kind)
+            if kind is RuleKind.PERMIT and not any(sum(_is_about(each, at) for each in permits) == 1 for at in about):
+                continue  # another rule permits the same skills: it need not hold
             yield rule.when, kind is RuleKind.PERMIT, f"rule {number + 1}, {kind.name.lower()}", of
 
 
+def _is_about(rule: Rule, skill: int) -> bool:
+    return not rule.skills or skill in rule.skills
+
+
 def _compared(node: Node, *, holds: bool) -> Iterator[tuple[int, int, bool]]:
-    """Yield slot, limit, and whether it is a lower limit."""
+    """Yield slot, limit, and whether it is a lower limit. A branch of an `or` that has to hold, or of an `and` that
+    must not hold, is no limit alone.
+    """
     match node:
-        case Both(left, right) | Either(left, right):
+        case Both(left, right) if holds:
+            yield from _compared(left, holds=holds)
+            yield from _compared(right, holds=holds)
+        case Either(left, right) if not holds:
             yield from _compared(left, holds=holds)
             yield from _compared(right, holds=holds)
         case Negation(operand):

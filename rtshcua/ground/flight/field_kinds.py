@@ -80,7 +80,8 @@ KINDS: Final[Mapping[type, Mapping[str, Kind]]] = {
     SignalLimit: {"value": _.VALUE, "low": _.MACHINE, "told": _.OUTSIDE},
     SignalCurve: {"series": _.PART, "limits": _.PART},
     SignalSeries: {
-        "name": _.WORD, "dimension": _.WORD, "labels": _.WORD, "stale_us": _.TIME, "points": _.VALUE,
+        "name": _.WORD, "dimension": _.WORD, "datum": _.MACHINE, "labels": _.WORD, "stale_us": _.TIME,
+        "points": _.VALUE,
     },
     GapView: {"what": _.MACHINE, "told": _.TEXT},
     ListedRecord: {"seq": _.MACHINE, "t_us": _.TIME, "told": _.TEXT},

@@ -5,7 +5,7 @@ the same bytes.
 
 import json
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
@@ -35,6 +35,8 @@ from rtshcua.ground.drawing.time_charts import (
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
 from rtshcua.ground.flight import embedding
 from rtshcua.ground.flight.flight_content import LANES, FlightReport, SignalCurve
+from rtshcua.ground.flight.track import parts
+from rtshcua.ground.flight.units import unit_of
 from rtshcua.model.flat.zone import SHIFT, Projection
 from rtshcua.model.quantity import Dimension, display
 
@@ -46,19 +48,6 @@ MOST_TOLD: Final = 500
 _BEFORE: Final = 20
 #: the most points of a drawn line
 _MOST_POINTS: Final = 1_200
-#: by dimension: the unit on the page, and how many canonical units it has
-_UNITS: Final[Mapping[str, tuple[str, int]]] = {
-    Dimension.LENGTH.value: ("m", 1_000),
-    Dimension.ALTITUDE.value: ("m above home", 1_000),
-    Dimension.SPEED.value: ("m/s", 1_000),
-    Dimension.DURATION.value: ("s", 1_000_000),
-    Dimension.ANGLE.value: ("deg", 10_000_000),
-    Dimension.RATIO.value: ("%", 100),
-    Dimension.VOLTAGE.value: ("V", 1_000),
-    Dimension.COUNT.value: ("", 1),
-}
-#: a longer time without a report is a gap of the track, us
-_GAP_US: Final = 5_000_000
 #: the most decisions that are marked on the map
 _MOST_MARKS: Final = 20
 #: the width of the drawing of a signal, px
@@ -142,14 +131,10 @@ def _flown(report: FlightReport) -> FlownWay | None:
     if track is None:
         return None
     places = track.places or ((0, 0),) * len(track.points)
-    parts: list[list[FlownPlace]] = []
-    before_us: int | None = None
+    flown = []
     for point, (x, y) in zip(track.points, places, strict=True):
-        if before_us is None or point.t_us - before_us > _GAP_US:
-            parts.append([])
         ground = None if point.above_ground is None else point.above_home - point.above_ground
-        parts[-1].append(FlownPlace(point.t_us, x, y, point.above_home, ground))
-        before_us = point.t_us
+        flown.append(FlownPlace(point.t_us, x, y, point.above_home, ground))
     first = sorted(report.decisions, key=lambda each: each.outcome == "allow")[:_MOST_MARKS]
     marks = tuple(
         FlightMark(each.t_us, *(each.where or (0, 0)), f"{each.seq}: {each.outcome}",
@@ -157,7 +142,7 @@ def _flown(report: FlightReport) -> FlownWay | None:
         for each in sorted(first, key=lambda each: each.t_us)
         if each.where is not None or not track.places
     )  # fmt: skip
-    return FlownWay(tuple(map(tuple, parts)), marks)
+    return FlownWay(tuple(tuple(flown[part.start : part.stop]) for part in parts(track.points)), marks)
 
 
 def _scaled(points: Sequence[tuple[int, int | None]], divide: int) -> list[tuple[int, float | None]]:
@@ -166,15 +151,15 @@ def _scaled(points: Sequence[tuple[int, int | None]], divide: int) -> list[tuple
 
 def _signal(view: SignalCurve, axis: TimeAxis) -> TimeChart:
     series = view.series
-    unit, divide = _UNITS.get(series.dimension, ("", 1))
+    unit = unit_of(series)
+    divide = 10**unit.digits
     points = _scaled(thinned(series.points, _MOST_POINTS), 1 if series.labels else divide)
     limits = [ChartLimit(each.value / divide, each.told, each.low) for each in view.limits]
     used = {int(value) for _, value in points if value is not None}
     labels = {number: series.labels.get(number, str(number)) for number in sorted(used)} if series.labels else None
     told = f"The values of {series.name} over time."
-    return time_chart(
-        series.name, told, unit, axis, [ChartLine("signal", series.name, points, series.stale_us)], limits, labels
-    )
+    line = ChartLine("signal", series.name, points, series.stale_us)
+    return time_chart(series.name, told, unit.symbol, axis, [line], limits, labels)
 
 
 def _lanes(report: FlightReport, axis: TimeAxis) -> LaneChart:
@@ -246,12 +231,13 @@ def _plane(projection: Projection | None) -> dict[str, float]:
 
 def _signal_data(view: SignalCurve, axis: TimeAxis) -> dict[str, object]:
     series = view.series
-    unit, divide = _UNITS.get(series.dimension, ("", 1))
+    unit = unit_of(series)
+    divide = 10**unit.digits
     points = thinned(series.points, _MOST_POINTS)
     return {
         "name": series.name,
         "gap": line_gap_us(series.stale_us, axis) // 1_000,
-        "unit": unit,
+        "unit": unit.symbol,
         "divide": 1 if series.labels else divide,
         "labels": {str(number): text for number, text in series.labels.items()},
         "t": _differences(t_us // 1_000 for t_us, _ in points),

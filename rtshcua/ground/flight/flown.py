@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from rtshcua.evidence.records import AnyRecord, Genesis
-from rtshcua.model.flat.mission import Mission
+from rtshcua.ground.flight.log_times import LogSegment, since_begun
+from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import project
 
@@ -41,11 +42,12 @@ class GeoPlace(NamedTuple):
 
 class SignalSeries(NamedTuple):
     """The values of one of the policy's signals, in canonical units (`dimension`); None means "reported as unknown".
-    `labels` name the values of an enumeration.
+    `labels` name the values of an enumeration; `datum` is that of an altitude (`Datum`), else empty.
     """
 
     name: str
     dimension: str
+    datum: str
     labels: Mapping[int, str]
     stale_us: int
     points: tuple[tuple[int, int | None], ...]
@@ -60,16 +62,26 @@ class VehicleText(NamedTuple):
 
 
 class TelemetrySilence(NamedTuple):
-    """A time without a report of the autopilot's position, signals or state in the telemetry."""
+    """A time of the log without a report of the autopilot's position, signals or state in the telemetry."""
 
     from_us: int
     to_us: int
 
 
+class ClockStep(NamedTuple):
+    """A step of the clock that the telemetry's times are from: after which time it was, and by how much, us."""
+
+    after_us: int
+    by_us: int
+
+
 class FlightTelemetry(NamedTuple):
-    """What the telemetry of a flight says; `reports` is the number of frames with these, and `damaged` says where
-    the file breaks off (an octet), None if it is whole. `boot_us` has for each point of the track its time and
-    the autopilot's own time since its boot, in us.
+    """What the telemetry of a flight says, in the order of time; `reports` is the number of frames with these, and
+    `damaged` says where the file breaks off (an octet), None if it is whole. `home` is the one in force when the
+    vehicle left the ground. `boot_us` has for each point of the track its time and the autopilot's own time since its
+    boot, in us. If it has the reports of several vehicles (MAVLink system ids) that may be the one that was commanded,
+    `vehicles` are these, and the first is the one that is told. Of `stray` positions nobody knows the time, because
+    the clock made `steps`; they are left out.
     """
 
     reports: int
@@ -80,11 +92,16 @@ class FlightTelemetry(NamedTuple):
     silences: tuple[TelemetrySilence, ...]
     boot_us: tuple[tuple[int, int], ...]
     damaged: int | None
+    vehicles: tuple[int, ...] = ()
+    steps: tuple[ClockStep, ...] = ()
+    stray: int = 0
 
 
 class Flight(NamedTuple):
     """A flight. `mission` is the one that was in force at the end, with the steps that replaced others; `records` are
     those of the log, in order, without the octets of bundle and trust root. `telemetry` is None if there is none.
+    `lasted_us` is the time of the last record that the flight itself wrote, and `steps` are all that were ever in
+    force.
     """
 
     genesis: Genesis
@@ -92,10 +109,13 @@ class Flight(NamedTuple):
     mission: Mission
     records: tuple[AnyRecord, ...]
     telemetry: FlightTelemetry | None
+    segments: tuple[LogSegment, ...]
+    lasted_us: int
+    steps: tuple[Invocation, ...]
 
-    def since_begun(self, at_us: int) -> int:
+    def since_begun(self, record: AnyRecord) -> int:
         """The time of a record of the log since its first one."""
-        return at_us - self.genesis.at_us
+        return since_begun(self.segments, record)
 
     def utc_of(self, t_us: int) -> int:
         """The UTC of a time in us since the Unix epoch, by the clock at the beginning of the log."""

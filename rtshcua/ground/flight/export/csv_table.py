@@ -18,13 +18,12 @@ from rtshcua.ground.flight.export.exported import (
     METRES,
     SECONDS,
     FlightExport,
-    SignalUnit,
     decimal,
     shown,
-    unit_of,
     utc_text,
 )
 from rtshcua.ground.flight.flown import SignalSeries, TrackPoint
+from rtshcua.ground.flight.units import SignalUnit, unit_of
 
 DATUM: Final = "each column of heights names its own"
 _TRACK: Final = (
@@ -39,7 +38,7 @@ def csv_table(export: FlightExport) -> bytes:
     """The table in UTF-8, with a header."""
     telemetry = export.flight.telemetry
     signals = () if telemetry is None else telemetry.signals
-    columns = [_Column(each, unit_of(each, export.flight.policy.signals)) for each in signals]
+    columns = [_Column(each, unit_of(each)) for each in signals]
     text = StringIO()
     table = csv.writer(text)  # quotes and lines as in RFC 4180
     table.writerow((*_TRACK, *(each.title for each in columns), "records", "log"))

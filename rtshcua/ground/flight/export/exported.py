@@ -4,38 +4,19 @@ Values are integers until they are written. A text that comes from outside (name
 `shown` in every format: control, invisible and reordering characters become visible, as `<U+202E>`.
 """
 
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.ground.flight.flown import Flight, GeoPlace, SignalSeries, TrackPoint
-from rtshcua.mavlink.dialect import DATUM
-from rtshcua.model.flat.signal import DRAIN, Signal
-from rtshcua.model.flat.zone import HALF_TURN
-from rtshcua.model.quantity import Datum, Dimension
+from rtshcua.ground.flight.flown import Flight, TrackPoint
+from rtshcua.ground.flight.track import exists, parts
 from rtshcua.model.step_number import number_of
 
 #: decimals of a value in 1e-7 degree, in mm or mm/s, in 1/100 degree, and in us
 DEGREES, METRES, HEADING, SECONDS = 7, 3, 2, 6
-#: from this gap on, two points of a track are not joined, us
-GAP_US: Final = 5_000_000
 #: the first UTC that MCAP cannot represent (2**64 ns, in the year 2554), us
 NO_TIME: Final = 2**64 // 1_000
-
-#: unit and decimals of the dimensions of signals; of an altitude the datum is written too
-_UNITS: Final = {
-    Dimension.LENGTH.value: ("m", 3),
-    Dimension.ALTITUDE.value: ("m", 3),
-    Dimension.SPEED.value: ("m_s", 3),
-    Dimension.DURATION.value: ("s", 6),
-    Dimension.ANGLE.value: ("deg", 7),
-    Dimension.RATIO.value: ("percent", 2),
-    Dimension.VOLTAGE.value: ("V", 3),
-    Dimension.COUNT.value: ("", 0),
-}
 
 
 class ToldRecord(NamedTuple):
@@ -101,27 +82,6 @@ class FlightExport(NamedTuple):
         )
 
 
-class HomeHeight(NamedTuple):
-    """The place of home in 1e-7 degree, and its height above mean sea level in mm, None if it is not known. `reported`:
-    the vehicle said where its home is; otherwise it is the declared one.
-    """
-
-    latitude: int
-    longitude: int
-    above_sea: int | None
-    reported: bool
-
-
-def home_of(flight: Flight) -> HomeHeight:
-    """The vehicle's home (HOME_POSITION), or else the declared one, with the height that the track implies."""
-    telemetry, declared = flight.telemetry, flight.policy.projection
-    if telemetry is not None and telemetry.home is not None and _exists(telemetry.home):
-        return HomeHeight(*telemetry.home, True)
-    track = () if telemetry is None else telemetry.track
-    above_sea = track[0].above_sea - track[0].above_home if track else None
-    return HomeHeight(declared.latitude, declared.longitude, above_sea, False)
-
-
 def with_usable_track(flight: Flight) -> tuple[Flight, int]:
     """The flight without the points of its track that no format can hold, and their number: places that do not exist,
     0 N 0 E, which autopilots report before they know where they are, and times outside of 1970 to 2554.
@@ -140,47 +100,12 @@ def with_usable_track(flight: Flight) -> tuple[Flight, int]:
 
 
 def _is_usable(point: TrackPoint, begun_us: int) -> bool:
-    return _exists(point) and 0 <= begun_us + point.t_us < NO_TIME
-
-
-def _exists(at: TrackPoint | GeoPlace) -> bool:
-    on_earth = abs(at.latitude) <= HALF_TURN // 2 and abs(at.longitude) <= HALF_TURN
-    return on_earth and (at.latitude, at.longitude) != (0, 0)
+    return exists(point) and 0 <= begun_us + point.t_us < NO_TIME
 
 
 def segments(track: Sequence[TrackPoint]) -> Iterator[tuple[TrackPoint, ...]]:
     """The parts of a track between gaps; what was flown in a gap is not known."""
-    begin = 0
-    for number, (one, other) in enumerate(pairwise(track), start=1):
-        if other.t_us - one.t_us > GAP_US:
-            yield tuple(track[begin:number])
-            begin = number
-    if begin < len(track):
-        yield tuple(track[begin:])
-
-
-class KnownPlace(NamedTuple):
-    """The reported place nearest in time, and how far its report is from the time in question, us."""
-
-    point: TrackPoint
-    off_us: int
-
-    @property
-    def remark(self) -> str:
-        """How old the place is, where that matters; else empty."""
-        if abs(self.off_us) <= 1_000_000:
-            return ""
-        when = "earlier" if self.off_us > 0 else "later"
-        return f"place reported {decimal(abs(self.off_us), SECONDS)[:-3]} s {when}"
-
-
-def place_at(track: Sequence[TrackPoint], t_us: int) -> KnownPlace | None:
-    """Where the vehicle was; None without a track."""
-    if not track:
-        return None
-    after = bisect_right(track, t_us, key=lambda each: each.t_us)
-    near = min(track[max(after - 1, 0) : after + 1], key=lambda each: abs(each.t_us - t_us))
-    return KnownPlace(near, t_us - near.t_us)
+    return (tuple(track[part.start : part.stop]) for part in parts(track))
 
 
 def decimal(value: int, digits: int) -> str:
@@ -205,28 +130,3 @@ def utc_text(us: int, digits: int = SECONDS) -> str:
 def shown(text: str) -> str:
     """A text from outside as one line that every format and reader can hold."""
     return visible(text)
-
-
-class SignalUnit(NamedTuple):
-    """How the values of a signal are written: a suffix for its name, and decimals."""
-
-    suffix: str
-    digits: int
-
-    @property
-    def title(self) -> str:
-        """The suffix with its separator."""
-        return f"_{self.suffix}" if self.suffix else ""
-
-
-def unit_of(signal: Signal | SignalSeries, signals: Sequence[Signal]) -> SignalUnit:
-    """The unit of a signal of a policy, with the datum of an altitude (by its first message and field)."""
-    suffix, digits = _UNITS.get(signal.dimension, ("", 0))
-    if signal.name == DRAIN:
-        suffix = f"{suffix}_per_min"
-    if signal.dimension == Dimension.ALTITUDE.value:
-        declared = next((each for each in signals if each.name == signal.name), None)
-        source = None if declared is None or not declared.sources else declared.sources[0]
-        datum = None if source is None else DATUM.get((source.message, source.fields[0]))
-        suffix = f"above_{Datum.HOME.value if datum is None else datum.value}_m"
-    return SignalUnit(suffix, digits)

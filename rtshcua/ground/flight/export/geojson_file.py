@@ -15,14 +15,13 @@ from rtshcua.ground.flight.export.exported import (
     METRES,
     SECONDS,
     FlightExport,
-    home_of,
     number,
-    place_at,
     segments,
     shown,
     utc_text,
 )
 from rtshcua.ground.flight.export.geo_shapes import GeoArea, Ring, ZoneShape, cut_line, planned_path, zone_shapes
+from rtshcua.ground.flight.track import home_of, place_at
 
 DATUM: Final = "WGS 84 positions without a height; heights are properties that name their datum"
 

@@ -12,13 +12,13 @@ from rtshcua.ground.flight.export.exported import (
     METRES,
     FlightExport,
     decimal,
-    place_at,
     segments,
     shown,
     utc_text,
 )
 from rtshcua.ground.flight.export.xml_text import add, document
 from rtshcua.ground.flight.flown import TrackPoint
+from rtshcua.ground.flight.track import place_at
 
 DATUM: Final = "above mean sea level as the autopilot reported it"
 _SPACE: Final = "http://www.topografix.com/GPX/1/1"

@@ -15,16 +15,14 @@ from rtshcua.ground.flight.export.exported import (
     DEGREES,
     METRES,
     FlightExport,
-    HomeHeight,
     decimal,
-    home_of,
-    place_at,
     segments,
     shown,
     utc_text,
 )
 from rtshcua.ground.flight.export.geo_shapes import GeoArea, Ring, ZoneShape, cut_line, planned_path, zone_shapes
 from rtshcua.ground.flight.export.xml_text import add, document
+from rtshcua.ground.flight.track import HomeHeight, home_of, place_at
 
 #: colours as aabbggrr: of the track, the planned path, zones to stay inside, zones to stay outside, and other zones
 _LINES: Final = {"track": "ff00aaff", "planned": "ffff8800"}

@@ -19,9 +19,9 @@ from rtshcua.ground.flight.export.exported import (
     ToldRecord,
     number,
     shown,
-    unit_of,
 )
 from rtshcua.ground.flight.flown import SignalSeries, TrackPoint
+from rtshcua.ground.flight.units import unit_of
 
 DATUM: Final = "`foxglove.LocationFix.altitude` is above mean sea level; other heights name their datum"
 
@@ -147,7 +147,7 @@ def _channels(export: FlightExport) -> dict[str, Schema]:
     channels = {"/location": _FIX, "/position": _STATE, "/decisions": _RECORDS[True], "/events": _RECORDS[False]}
     channels["/texts"] = _LOG
     for signal in () if telemetry is None else telemetry.signals:
-        name, unit = shown(signal.name), unit_of(signal, export.flight.policy.signals)
+        name, unit = shown(signal.name), unit_of(signal)
         value = unit.suffix or "value"
         fields = {value: f"{name} in {unit.suffix}" if unit.suffix else name}
         if signal.labels:
@@ -170,7 +170,7 @@ def _messages(export: FlightExport) -> Iterator[_Message]:
         yield _Message("/location", utc_us, _fix(point, utc_us, vehicle))
         yield _Message("/position", utc_us, _state(point))
     for signal in telemetry.signals:
-        topic, unit = _topic(signal), unit_of(signal, flight.policy.signals)
+        topic, unit = _topic(signal), unit_of(signal)
         for t_us, value in signal.points:
             content: dict[str, object] = {}
             if value is not None:

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from rtshcua.diagnostics.excerpt import escaped
-from rtshcua.ground.flight.export.exported import DEGREES, METRES, SECONDS, FlightExport, home_of, number
+from rtshcua.ground.flight.export.exported import DEGREES, METRES, SECONDS, FlightExport, number
+from rtshcua.ground.flight.track import home_of
 from rtshcua.mavlink import enums
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation

@@ -1,12 +1,15 @@
 """The content of a flight's report: six lines that answer a customer's questions, from the log alone."""
 
 import json
+from base64 import b64encode
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from reference import bound_run
 from reference.forgery import edit, signed
+from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, flight_report
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -14,7 +17,8 @@ from rtshcua.front.cli.app import main
 from rtshcua.ground.flight.embedding import extract
 from rtshcua.ground.flight.flight_content import FlightReport, as_plain
 from rtshcua.ground.flight.flight_page import page
-from virtual import case
+from rtshcua.mavlink import tlog
+from virtual import case, run_folder
 from virtual.flight_reports import MADE_US, PIN, report_of
 
 
@@ -70,6 +74,21 @@ def test_events_and_decisions_are_those_of_the_log(completed: Path) -> None:
     assert report.timeline == tuple(sorted(report.timeline, key=lambda each: each.t_us))
 
 
+def test_lost_link_is_a_gap_to_the_end_and_its_decisions_have_no_place(completed: Path, tmp_path: Path) -> None:
+    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
+    begun_us = json.loads(lines[0])["utc_us"]
+    entries = [(each.at_us, each.frame) for each in tlog.read((completed / "telemetry.tlog").read_bytes())]
+    kept = [each for each in entries if each[0] < begun_us + 18 * case.S]
+    run = run_folder.folder(tmp_path / "lost", (lines, kept, (completed / "mission.bundle").read_bytes()))
+    report = report_of(run).report
+    assert "no frame of the autopilot from 17.9 s to the end" in [each.told for each in report.gaps]
+    placed = {each.where is not None for each in report.decisions if each.t_us < 18 * case.S}
+    late = [each.where for each in report.decisions if each.t_us > 24 * case.S]
+    assert (placed, late) == ({True}, [None] * len(late))
+    assert late
+    assert not any("to the end" in each.told for each in report_of(completed).report.gaps)
+
+
 def test_repeated_decisions_are_one(completed: Path) -> None:
     lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
     at = next(n for n, line in enumerate(lines) if b'"type":"decision"' in line)
@@ -109,6 +128,21 @@ def test_log_without_a_first_record_is_refused(tmp_path: Path, data: bytes) -> N
     (tmp_path / "log.jsonl").write_bytes(data)
     found = flight_report(FlightReportRequest(tmp_path / "log.jsonl", PIN, (), MADE_US))
     assert isinstance(found, Refusal)
+
+
+def test_log_whose_policy_reads_an_unknown_message_is_refused(completed: Path, tmp_path: Path) -> None:
+    """Nobody has verified it when its telemetry is read."""
+    policy = case.policy()
+    source = replace(policy.signals[0].sources[0], message="NO_SUCH_MESSAGE")
+    signals = (replace(policy.signals[0], sources=(source,)), *policy.signals[1:])
+    bundle = case.seal(case.mission(case.short_steps()), replace(policy, signals=signals))
+    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
+    lines[0] = edit(lines[0], bundle=b64encode(bundle).decode())
+    (tmp_path / "log.jsonl").write_bytes(b"".join(lines))
+    (tmp_path / "telemetry.tlog").write_bytes((completed / "telemetry.tlog").read_bytes())
+    found = read_flight(tmp_path / "log.jsonl")
+    assert isinstance(found, Refusal)
+    assert "NO_SUCH_MESSAGE" in found.text
 
 
 def test_embedded_log_is_the_file(completed: Path) -> None:

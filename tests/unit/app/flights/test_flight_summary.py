@@ -49,8 +49,8 @@ def test_nobody_was_asked(lines: list[bytes], tmp_path: Path) -> None:
 def test_answers_are_told_apart(lines: list[bytes], tmp_path: Path) -> None:
     of = documents.low()
     yes, no = (b64encode(documents.approval(of, granted=granted)).decode() for granted in (1, 0))
-    answered = [*lines[:-1], deferred(lines, 1), effect(lines, "approval", 1, yes), deferred(lines, 2),
-                effect(lines, "approval", 2, no), deferred(lines, 0)]  # fmt: skip
+    answered = [*lines[:-1], deferred(lines, 1), effect(lines, "approval", 1, yes, seq=900), deferred(lines, 2),
+                effect(lines, "approval", 2, no, seq=901), deferred(lines, 0)]  # fmt: skip
     text = allowed(answered, tmp_path)
     assert "Granted by signature: step 2: granted as supervisor" in text
     assert "Refused by signature: step 3: refused as supervisor" in text

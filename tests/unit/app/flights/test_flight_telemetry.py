@@ -63,7 +63,7 @@ def test_charge_is_a_signal(completed: Path, basis: tuple[Policy, int]) -> None:
 
 def test_thinned_reading_has_the_same_values_less_often(completed: Path, basis: tuple[Policy, int]) -> None:
     whole = read_telemetry(completed / "telemetry.tlog", *basis)
-    some = read_telemetry(completed / "telemetry.tlog", *basis, Thinning(2_000_000, 2_000_000))
+    some = read_telemetry(completed / "telemetry.tlog", *basis, None, Thinning(2_000_000, 2_000_000))
     assert set(some.track) < set(whole.track)
     assert len(some.track) < len(whole.track) / 3
     assert all(b.t_us - a.t_us >= 2_000_000 for a, b in zip(some.track, some.track[1:], strict=False))
@@ -77,7 +77,7 @@ def test_growing_file_gives_the_same(completed: Path, basis: tuple[Policy, int],
     for end in (0, 5, 1_000, 1_001, len(data) // 2, len(data)):
         growing.write_bytes(data[:end])
         reading.follow(growing)
-    assert reading.telemetry() == read_telemetry(completed / "telemetry.tlog", *basis, Thinning(250_000, 250_000))
+    assert reading.telemetry() == read_telemetry(completed / "telemetry.tlog", *basis, None, Thinning(250_000, 250_000))
     assert not reading.follow(growing)
 
 

@@ -32,7 +32,7 @@ class Began:
 def flight(pairs: list[tuple[int, int]], utc_error_us: int = 100_000) -> Flight:
     track = tuple(TrackPoint(t_us, 0, 0, 0, 0, None, 0, 0, 0, None) for t_us, _ in pairs)
     telemetry = FlightTelemetry(len(pairs), track, None, (), (), (), tuple(pairs), None)
-    return Flight(cast("Genesis", Began(utc_error_us)), cast("Any", None), cast("Any", None), (), telemetry)
+    return Flight(cast("Genesis", Began(utc_error_us)), cast("Any", None), cast("Any", None), (), telemetry, (), 0, ())
 
 
 def log(first_us: int, last_us: int, utc: UtcOfBoot | None = None) -> AutopilotLog:

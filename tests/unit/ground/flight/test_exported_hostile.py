@@ -27,7 +27,6 @@ from rtshcua.ground.flight.export.exported import (
     FlightExport,
     decimal,
     number,
-    place_at,
     utc_text,
     with_usable_track,
 )
@@ -38,6 +37,7 @@ from rtshcua.ground.flight.export.kml import kml
 from rtshcua.ground.flight.export.mcap_file import mcap_file
 from rtshcua.ground.flight.export.qgc_plan import qgc_plan
 from rtshcua.ground.flight.flown import TrackPoint, VehicleText
+from rtshcua.ground.flight.track import place_at
 from rtshcua.model.flat.zone import HALF_TURN, TURN
 
 #: what readers of XML, HTML, CSV, JSON and terminals could take for more than text

@@ -1,0 +1,37 @@
+"""What the telemetry of a flight leaves open, in words."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from rtshcua.app.wording import many
+from rtshcua.diagnostics.suggest import listed
+from rtshcua.ground.flight.flown import FlightTelemetry
+
+#: the most silences and steps of the clock that are told
+_MOST: Final = 20
+
+
+def doubts(telemetry: FlightTelemetry) -> Iterator[str]:
+    """Yield what makes it doubtful whose the telemetry is, and of which time."""
+    if telemetry.vehicles:
+        systems, told = listed(map(str, telemetry.vehicles)), telemetry.vehicles[0]
+        yield f"it has vehicles with the system ids {systems}; which one was commanded is not known, this is `{told}`"
+    for step in telemetry.steps[:_MOST]:
+        way = "back" if step.by_us < 0 else "forward"
+        yield f"its clock went {way} by {_seconds(abs(step.by_us))} after {_seconds(step.after_us)}"
+    if telemetry.stray:
+        yield f"{many(telemetry.stray, 'position')} of an unknown time, which the log does not have, are left out"
+
+
+def silences(telemetry: FlightTelemetry, lasted_us: int) -> Iterator[str]:
+    """Yield the longest silences, in the order of time."""
+    longest = sorted(telemetry.silences, key=lambda each: each.from_us - each.to_us)[:_MOST]
+    for silence in sorted(longest):
+        to = "the end" if silence.to_us >= lasted_us else _seconds(silence.to_us)
+        yield f"no frame of the autopilot from {_seconds(silence.from_us)} to {to}"
+    if len(telemetry.silences) > _MOST:
+        yield f"and {many(len(telemetry.silences) - _MOST, 'shorter silence')}"
+
+
+def _seconds(us: int) -> str:
+    return f"{us / 1_000_000:.1f} s"

@@ -17,7 +17,7 @@ from rtshcua.app.sidecar_files import SENDER_AND_NUMBER
 from rtshcua.codec.frames import Codec, ReceivedFrame, kind_of
 from rtshcua.ground.audit.frames import OURS
 from rtshcua.ground.flight.flown import (
-    ClockStep,
+    ClockJump,
     FlightTelemetry,
     GeoPlace,
     SignalSeries,
@@ -306,11 +306,11 @@ def _in_order(points: Sequence[_Timed], span: tuple[int, int] | None) -> tuple[_
     return tuple(sorted(within, key=itemgetter(0)))
 
 
-def _steps(runs: Sequence[tuple[int, int]], lasted_us: int | None) -> tuple[ClockStep, ...]:
+def _steps(runs: Sequence[tuple[int, int]], lasted_us: int | None) -> tuple[ClockJump, ...]:
     """The steps of the clock between runs: back, or forward by more than the flight has room for."""
     most_us = -_NEVER if lasted_us is None else max(lasted_us, FORWARD_US)
     between = [(one[1], other[0] - one[1]) for one, other in pairwise(runs)]
-    return tuple(ClockStep(after_us, by_us) for after_us, by_us in between if by_us < 0 or by_us > most_us)
+    return tuple(ClockJump(after_us, by_us) for after_us, by_us in between if by_us < 0 or by_us > most_us)
 
 
 def _silences(

@@ -26,7 +26,7 @@ from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Recover, Seal
 from rtshcua.evidence.report import LogReport
-from rtshcua.ground.flight.field_kinds import KINDS, Kind, fields_of
+from rtshcua.ground.flight.field_kinds import KINDS, FieldKind, fields_of
 from rtshcua.ground.flight.flight_content import DecisionView, FlightReport, ListedRecord, ReadSignal, SignalCurve
 from rtshcua.ground.flight.flown import Flight
 from rtshcua.model.flat.mission import Mission
@@ -188,38 +188,38 @@ class Redaction:
             return dataclass_replace(value, **new)
         return type(value)(**new)
 
-    def _kept(self, kind: Kind, value: Any) -> Any:
+    def _kept(self, kind: FieldKind, value: Any) -> Any:
         """The value of a field, or what stands in its place."""
         if value is None:
             return None
-        if kind in (Kind.PLACE, Kind.NO_PLACE):
+        if kind in (FieldKind.PLACE, FieldKind.NO_PLACE):
             if self.position:
-                return None if kind is Kind.NO_PLACE else type(value)()
+                return None if kind is FieldKind.NO_PLACE else type(value)()
             return self._inner(value)
-        if kind is Kind.OUTSIDE:
+        if kind is FieldKind.OUTSIDE:
             return type(value)()
-        if isinstance(value, tuple) and type(value) is tuple and kind not in (Kind.VALUE, Kind.MACHINE):
+        if isinstance(value, tuple) and type(value) is tuple and kind not in (FieldKind.VALUE, FieldKind.MACHINE):
             return tuple(self._kept(kind, each) for each in value)
-        if isinstance(value, Mapping) and kind is Kind.WORD:
+        if isinstance(value, Mapping) and kind is FieldKind.WORD:
             return {number: self._word(each) for number, each in value.items()}
         return self._one(kind, value)
 
-    def _one(self, kind: Kind, value: Any) -> Any:
+    def _one(self, kind: FieldKind, value: Any) -> Any:
         match kind:
-            case Kind.PART:
+            case FieldKind.PART:
                 return self._part(value)
-            case Kind.TEXT:
+            case FieldKind.TEXT:
                 return self._sentence(value)
-            case Kind.NAME:
+            case FieldKind.NAME:
                 return self._names.get(value, _GONE if value else "") if self.names else value
-            case Kind.WORD:
+            case FieldKind.WORD:
                 return self._word(value)
-            case Kind.CALL:
+            case FieldKind.CALL:
                 return self._code(value) if value else ""
-            case Kind.SOURCE:
+            case FieldKind.SOURCE:
                 return "" if self.names else value
-            case Kind.MACHINE | Kind.TIME | Kind.HEIGHT | Kind.VALUE | Kind.LOG:
-                if isinstance(value, str) and kind is not Kind.LOG:
+            case FieldKind.MACHINE | FieldKind.TIME | FieldKind.HEIGHT | FieldKind.VALUE | FieldKind.LOG:
+                if isinstance(value, str) and kind is not FieldKind.LOG:
                     self._said |= words_of(value)
                 return value
         raise TypeError(f"{kind} of {type(value).__name__} has no rule")

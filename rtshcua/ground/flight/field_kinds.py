@@ -35,7 +35,7 @@ from rtshcua.ground.flight.flown import SignalSeries, TrackPoint
 from rtshcua.model.flat.zone import Projection
 
 
-class Kind(Enum):
+class FieldKind(Enum):
     """What a field holds. Of a tuple, it is the kind of each member."""
 
     PART = auto()  # values with fields of their own
@@ -54,10 +54,10 @@ class Kind(Enum):
     LOG = auto()  # the embedded log, which is redacted by records
 
 
-_ = Kind
+_ = FieldKind
 
 #: the kind of every field
-KINDS: Final[Mapping[type, Mapping[str, Kind]]] = {
+KINDS: Final[Mapping[type, Mapping[str, FieldKind]]] = {
     FlightReport: {
         "title": _.TEXT, "made_by": _.MACHINE, "made_at": _.TIME, "mission": _.NAME, "vehicle": _.NAME, "begun": _.TIME,
         "begun_utc_us": _.TIME, "lasted_us": _.TIME, "ending": _.MACHINE, "steps_done": _.MACHINE, "steps": _.MACHINE,

@@ -68,7 +68,7 @@ class TelemetrySilence(NamedTuple):
     to_us: int
 
 
-class ClockStep(NamedTuple):
+class ClockJump(NamedTuple):
     """A step of the clock that the telemetry's times are from: after which time it was, and by how much, us."""
 
     after_us: int
@@ -93,7 +93,7 @@ class FlightTelemetry(NamedTuple):
     boot_us: tuple[tuple[int, int], ...]
     damaged: int | None
     vehicles: tuple[int, ...] = ()
-    steps: tuple[ClockStep, ...] = ()
+    steps: tuple[ClockJump, ...] = ()
     stray: int = 0
 
 

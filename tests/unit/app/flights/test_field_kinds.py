@@ -12,15 +12,15 @@ import pytest
 
 from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.flights.redaction import REDACTABLE, Redaction
-from rtshcua.ground.flight.field_kinds import KINDS, Kind, fields_of
+from rtshcua.ground.flight.field_kinds import KINDS, FieldKind, fields_of
 from rtshcua.ground.flight.flight_content import FlightReport
 from rtshcua.ground.flight.flown import Flight
 
 #: kinds that stay whatever is removed
-ALWAYS = {Kind.MACHINE, Kind.TIME, Kind.HEIGHT, Kind.VALUE, Kind.LOG}
+ALWAYS = {FieldKind.MACHINE, FieldKind.TIME, FieldKind.HEIGHT, FieldKind.VALUE, FieldKind.LOG}
 #: and those that stay with names, or with places
-NAMED = {Kind.NAME, Kind.WORD, Kind.CALL, Kind.SOURCE, Kind.TEXT}
-PLACED = {Kind.PLACE, Kind.NO_PLACE}
+NAMED = {FieldKind.NAME, FieldKind.WORD, FieldKind.CALL, FieldKind.SOURCE, FieldKind.TEXT}
+PLACED = {FieldKind.PLACE, FieldKind.NO_PLACE}
 
 
 def parts(hint: Any) -> Iterator[type]:
@@ -52,22 +52,22 @@ class Planter:
 
     def __init__(self, signal: str) -> None:
         self.number = count(7_000_001)
-        self.kinds: dict[str, Kind] = {}
+        self.kinds: dict[str, FieldKind] = {}
         self._signal = signal
 
-    def part(self, of: type, under: Kind = Kind.PART) -> Any:
+    def part(self, of: type, under: FieldKind = FieldKind.PART) -> Any:
         values = {}
         for name, hint in get_type_hints(of).items():
             if name not in KINDS[of]:
                 continue
-            kind = under if under in (*PLACED, Kind.OUTSIDE) else KINDS[of][name]
-            if name == "name" and kind is Kind.WORD:
+            kind = under if under in (*PLACED, FieldKind.OUTSIDE) else KINDS[of][name]
+            if name == "name" and kind is FieldKind.WORD:
                 values[name] = self._signal  # others are left out as a whole
             else:
                 values[name] = self.value(hint, kind)
         return of(**values)
 
-    def value(self, hint: Any, kind: Kind) -> Any:
+    def value(self, hint: Any, kind: FieldKind) -> Any:
         of, arguments = get_origin(hint), get_args(hint)
         if of in (Union, types.UnionType):
             return self.value(next(each for each in arguments if each is not type(None)), kind)
@@ -85,7 +85,7 @@ class Planter:
         mark = f"zq{number}zq"
         self.kinds[mark if hint is str else str(number)] = kind
         if hint is str:
-            return f"ours `{mark}` 12 m" if kind is Kind.TEXT else mark
+            return f"ours `{mark}` 12 m" if kind is FieldKind.TEXT else mark
         return number
 
 
@@ -114,12 +114,12 @@ def test_planted_texts_and_numbers_stay_only_by_their_kind(completed: Path, remo
     planted = planter.part(FlightReport)
     redaction = Redaction(flight, ("ada",), removed)
     kept = " ".join(told(redaction.report(planted, flight)))
-    stay = ALWAYS | (set() if "names" in removed else NAMED - {Kind.TEXT, Kind.CALL})
+    stay = ALWAYS | (set() if "names" in removed else NAMED - {FieldKind.TEXT, FieldKind.CALL})
     stay |= set() if "position" in removed else PLACED
     found = {mark: kind for mark, kind in planter.kinds.items() if mark in kept}
     assert len(planter.kinds) > 100
     assert set(found.values()) <= stay
     missing = {kind for mark, kind in planter.kinds.items() if mark not in found and kind in ALWAYS}
-    assert missing <= {Kind.MACHINE, Kind.TIME}  # of the listed records, which are told anew
+    assert missing <= {FieldKind.MACHINE, FieldKind.TIME}  # of the listed records, which are told anew
     if "position" in removed:
         assert "12 m" not in kept

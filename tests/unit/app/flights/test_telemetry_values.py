@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from reference import flat_case as flat
 from rtshcua.app.flights.flight_telemetry import Thinning, read_telemetry
 from rtshcua.app.flights.telemetry_told import doubts, silences
-from rtshcua.ground.flight.flown import ClockStep, FlightTelemetry, GeoPlace, TelemetrySilence
+from rtshcua.ground.flight.flown import ClockJump, FlightTelemetry, GeoPlace, TelemetrySilence
 from rtshcua.mavlink import tlog
 from rtshcua.model.flat.signal import SignalSource
 
@@ -199,7 +199,7 @@ def stepped(by_s: float) -> list[Entry]:
 def test_clock_that_goes_back_does_not_end_the_track(tmp_path: Path) -> None:
     found = read(tmp_path, stepped(-3_600), lasted_s=40)
     assert [each.above_home for each in found.track] == list(range(80))
-    assert (found.stray, found.steps) == (80, (ClockStep(19_750_000, 250_000 - 3_600 * S),))
+    assert (found.stray, found.steps) == (80, (ClockJump(19_750_000, 250_000 - 3_600 * S),))
     assert found.silences == (TelemetrySilence(19_750_000, 40 * S),)
     assert list(doubts(found)) == [
         "its clock went back by 3599.8 s after 19.8 s",

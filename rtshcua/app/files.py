@@ -3,13 +3,14 @@ names for missing files. Imports no parser, to start fast.
 """
 
 import os
+from codecs import BOM_UTF8
 from collections.abc import Collection, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Final
 
 from rtshcua.adapters.store.checkout import checkout_of, lies_in
-from rtshcua.adapters.store.reading import walk
+from rtshcua.adapters.store.reading import open_regular, walk
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import TYPO, likeness
 from rtshcua.ground.language.paths import shown
@@ -74,6 +75,27 @@ def overwriting_a_source(target: Path, read: Iterable[str | Path], what: str) ->
         return None
     help = "name a file that is not a source"
     return Refusal("output", f"`{target}` is one of the sources, and is not overwritten by {what}", help)
+
+
+#: how the files begin that a page, or a picture, may replace, in lower case
+PAGES: Final = (b"<!doctype html", b"<html")
+PICTURES: Final = (b"<?xml", b"<svg")
+_MOST_BLANK: Final = 256
+
+
+def overwriting_another(target: Path, begins: tuple[bytes, ...], what: str) -> Refusal | None:
+    """The refusal if `target` is a file that is neither empty nor of the kind to be written, by how it begins; else
+    None. Raises OSError.
+    """
+    if not target.is_file():
+        return None
+    with open_regular(target) as file:
+        head = file.read(_MOST_BLANK)
+    if not head or head.removeprefix(BOM_UTF8).lstrip().lower().startswith(begins):
+        return None
+    return Refusal(
+        "output", f"`{target}` is not {what}, and is not overwritten by one", "name another file, or move it"
+    )
 
 
 def _same(target: Path, other: Path) -> bool:

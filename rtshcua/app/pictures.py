@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from rtshcua.app.files import overwriting_a_source
+from rtshcua.app.files import PAGES, PICTURES, overwriting_a_source, overwriting_another
 from rtshcua.diagnostics.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -32,16 +32,18 @@ def unfit_picture(target: Path, files: Iterable[str | Path], *, as_json: bool) -
     if target.suffix.lower() != _SUFFIX:
         help = f"accepted: a file whose name ends in `{_SUFFIX}`, or `-` for standard output"
         return Refusal("usage", f"`{target}` in `--picture` is not the name of an SVG file", help)
-    return unfit_place(target, files, "a picture")
+    return unfit_place(target, files, "a picture", PICTURES)
 
 
-def unfit_place(target: Path, files: Iterable[str | Path], what: str) -> Refusal | None:
+def unfit_place(
+    target: Path, files: Iterable[str | Path], what: str, begins: tuple[bytes, ...] = PAGES
+) -> Refusal | None:
     """The refusal if no page or picture (`what`) can be written to `target`."""
     if not target.parent.is_dir():
         return Refusal("output", f"there is no folder `{target.parent}` to write to")
     if target.exists() and not target.is_file():
         return Refusal("output", f"`{target}` is not a regular file, and is not overwritten by {what}")
-    return overwriting_a_source(target, files, what)
+    return overwriting_a_source(target, files, what) or overwriting_another(target, begins, what)
 
 
 def write_page(target: Path, checked: Sequence["CheckedMissions"], sources: Iterable[str]) -> DrawnMissions | Refusal:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rtshcua import __version__
 from rtshcua.app.check import EarlierPolicies, earlier_policies
 from rtshcua.app.exit_codes import exit_code
-from rtshcua.app.files import overwriting_a_source, source_files
+from rtshcua.app.files import PAGES, overwriting_a_source, overwriting_another, source_files
 from rtshcua.app.programs import RootProgram, examine, keep_once, programs, read_sources
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
@@ -116,7 +116,9 @@ def _refusal(target: Path | None, files: Sequence[Path]) -> Refusal | None:
         return Refusal("output", f"`{target}` is not a regular file, and is not overwritten by a page")
     if target is not None and not target.parent.is_dir():
         return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
-    return None if target is None else overwriting_a_source(target, files, "a page")
+    if target is None:
+        return None
+    return overwriting_a_source(target, files, "a page") or overwriting_another(target, PAGES, "a page")
 
 
 class _Trials(NamedTuple):

@@ -1,5 +1,6 @@
 """The service `report`: verify a flight, and say what it was, as the content of a page; or what it is so far."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -77,7 +78,7 @@ def _with_log(report: FlightReport, request: FlightReportRequest, records: int, 
     """The report with the log, or of a redacted one with what may stay of it. Raises OSError."""
     with open_regular(request.log) as file:
         data = file.read(min(size, MOST_OCTETS + 1))
-    if request.removed:
+    if request.removed and len(data) <= MOST_OCTETS:
         kept = data.splitlines(keepends=True)[:records]
         data = redact(kept, may_stay(request.removed), checkpoints="names" not in request.removed)
     text = "" if len(data) > MOST_OCTETS else embed(data)
@@ -101,6 +102,10 @@ class LiveFlight:
         """Read what is new; return whether there was anything. Raises OSError."""
         before = self._offset
         with open_regular(self._log) as file:
+            if os.fstat(file.fileno()).st_size < self._offset:
+                flaw, found = self._collected.flaw, f"the log became shorter than its first {self._records} records"
+                self._collected.flaw = found
+                return flaw != found
             file.seek(self._offset)
             for line in lines(file):
                 if not line.endswith(b"\n"):

@@ -194,7 +194,7 @@ class TelemetryReading:
         system, key, number = frame[_SYSTEM], frame[SENDER_AND_NUMBER], int.from_bytes(frame[_NUMBER], "little")
         of = kind_of(number)
         if of is not None and frame[_COMPONENT] == OURS:
-            if not self._codec.parse(frame):
+            if self._parsed(frame) is None:
                 return None  # damaged: anybody may have sent it
             self._companions[system] = self._companions.get(system, False) or number != HEARTBEAT
         if of is None or frame[_COMPONENT] != AUTOPILOT or not (number in _READ or of.name in self._needed):
@@ -207,13 +207,18 @@ class TelemetryReading:
         vehicle.kinds.append(kind)
         return kind
 
-    def _decode(self, at_us: int, frame: bytes, kind: _Kind) -> None:
+    def _parsed(self, frame: bytes) -> ReceivedFrame | None:
+        """A frame; None if it is damaged, even if the octets of another one lie within it."""
         found = self._codec.parse(frame)
-        if not found:
+        return found[0] if found and found[0].frame == frame else None
+
+    def _decode(self, at_us: int, frame: bytes, kind: _Kind) -> None:
+        found = self._parsed(frame)
+        if found is None:
             return
         every_us = self._thinning.position_us if kind.number in _OF_PLACE else self._thinning.others_us
         kind.due_us = at_us + every_us if every_us and kind.number != STATUSTEXT else 0
-        self._read(at_us - self._begun_us, kind, found[0])
+        self._read(at_us - self._begun_us, kind, found)
 
     def _read(self, t_us: int, kind: _Kind, frame: ReceivedFrame) -> None:
         message: Any = frame.message

@@ -11,9 +11,10 @@ from rtshcua.app.flights.flight_summary import FlightSummary
 from rtshcua.app.flights.flight_timeline import timeline
 from rtshcua.app.flights.signal_limits import signal_limits
 from rtshcua.app.flights.telemetry_told import doubts, silences
+from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import many, true_to, utc
 from rtshcua.evidence.log_writer import origin_of
-from rtshcua.evidence.records import Close
+from rtshcua.evidence.records import Close, Effect
 from rtshcua.evidence.report import LogReport
 from rtshcua.ground.drawing.flat_site import site_of, way_of
 from rtshcua.ground.flight.flight_content import (
@@ -75,6 +76,7 @@ def flight_told(
         totals={} if report is None else dict(report.counts),
         log="",
         redacted=(),
+        simulated=any(isinstance(each, Effect) and each.event == SIMULATED for each in flight.records),
     )
 
 

@@ -65,6 +65,7 @@ KINDS: Final[Mapping[type, Mapping[str, FieldKind]]] = {
         _.MACHINE, "summary": _.PART, "projection": _.NO_PLACE, "site": _.PART, "way": _.PART, "track": _.PART, "bound":
         _.OUTSIDE, "timeline": _.PART, "decisions": _.PART, "signals": _.PART, "gaps": _.PART, "proven": _.TEXT,
         "unproven": _.TEXT, "records": _.PART, "totals": _.MACHINE, "log": _.LOG, "redacted": _.MACHINE,
+        "simulated": _.MACHINE,
     },
     SummaryLine: {"question": _.MACHINE, "answer": _.TEXT},
     ReadSignal: {"name": _.WORD, "value": _.VALUE, "age_us": _.TIME},

@@ -118,7 +118,7 @@ class FlightReport(NamedTuple):
     `highest` is the greatest height above home, and `distance` that over ground, by the telemetry. `verdict` is that
     of the verification that made the page: `verified`, `incomplete` or `failed`. `log` is the
     log as the page embeds it, empty if it is too large; `redacted` names what was removed.
-    `projection` is that of the local plane.
+    `projection` is that of the local plane. `simulated`: the flight says that nothing flew.
     """
 
     title: str
@@ -154,6 +154,7 @@ class FlightReport(NamedTuple):
     totals: Mapping[str, int]
     log: str
     redacted: tuple[str, ...]
+    simulated: bool
 
     @property
     def verified(self) -> str:

@@ -20,7 +20,9 @@ class LogbookEntry(NamedTuple):
 
 
 class LogbookTotals(NamedTuple):
-    """The totals of a logbook: times in us, distances in mm over ground, of the flights with telemetry."""
+    """The totals of a logbook: times in us, distances in mm over ground, of the flights with telemetry. A flight whose
+    log failed counts in `flights` and `verdicts` alone.
+    """
 
     flights: int
     lasted_us: int
@@ -28,15 +30,21 @@ class LogbookTotals(NamedTuple):
     verdicts: tuple[tuple[str, int], ...]
     completed: int
 
+    @property
+    def failed(self) -> int:
+        """How many logs failed."""
+        return dict(self.verdicts)["failed"]
+
 
 def totals(flights: Sequence[FlightReport]) -> LogbookTotals:
     """The totals of some flights."""
+    believed = [each for each in flights if each.verdict != "failed"]
     return LogbookTotals(
         len(flights),
-        sum(each.lasted_us for each in flights),
-        sum(each.distance or 0 for each in flights),
+        sum(each.lasted_us for each in believed),
+        sum(each.distance or 0 for each in believed),
         tuple((name, sum(each.verdict == name for each in flights)) for name in _VERDICTS),
-        sum(each.ending == "completed" for each in flights),
+        sum(each.ending == "completed" for each in believed),
     )
 
 

@@ -2,18 +2,20 @@
 
 import gc
 import json
+import os
 import re
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import quote
 
 import typer
 
 from rtshcua.adapters.store.writing import make_folder, replace_inside
 from rtshcua.app.documents import no_log
-from rtshcua.app.files import overwriting_a_source
+from rtshcua.app.files import PAGES, overwriting_another
 from rtshcua.app.flights.flight_report import FlightReportRequest, ReportedFlight, flight_report
 from rtshcua.app.flights.redaction import REDACTABLE, Redaction, redaction_of
 from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_meant
@@ -89,7 +91,7 @@ def report(
     made_at = time.time_ns() // 1_000 if at is None else moment(at)
     if made_at is None:
         return fail(ExitCode.USAGE, f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    logs = logs_meant(runs)
+    logs = list({os.path.realpath(log): log for log in reversed(logs_meant(runs))}.values())[::-1]
     for log in logs:
         if not is_log(log):
             return fail(ExitCode.INPUT, *no_log(log, log, NO_LOG_HELP))
@@ -132,7 +134,7 @@ def _target(output: Path | None, logs: Sequence[Path], *, redacted: bool, as_jso
         return Refusal("output", f"`{output}` is not a regular file, and is not overwritten by a page")
     if not output.parent.is_dir():
         return Refusal("output", f"there is no folder `{output.parent}` to write to", code=ExitCode.INPUT)
-    return overwriting_a_source(output, logs, "a page") or output
+    return overwriting_another(output, PAGES, "a page") or output
 
 
 def _name(log: Path, number: int, *, redacted: bool) -> str:
@@ -140,7 +142,8 @@ def _name(log: Path, number: int, *, redacted: bool) -> str:
     if redacted:
         return f"flight-{number}"
     folder = log.resolve().parent.name
-    return folder if log.name == "log.jsonl" and folder else log.stem
+    name = folder if log.name == "log.jsonl" and folder else log.stem
+    return os.fsencode(name).decode("utf-8", "replace")
 
 
 def _one(request: FlightReportRequest, target: Path | None, tiles: str, *, as_json: bool) -> ExitCode:
@@ -168,17 +171,16 @@ def _several(
         make_folder(folder)
     entries: list[LogbookEntry] = []
     redactions: list[Redaction] = []
-    code, names = ExitCode.OK, set[str]()
+    code, names = ExitCode.OK, {Path(_INDEX).stem}
     for number, log in enumerate(logs, 1):
         found = _reported(request._replace(log=log))
         if isinstance(found, Refusal):
             code = code or refuse(found)
             continue
-        name = _name(log, number, redacted=bool(request.removed))
-        name = name if name not in names else f"{name}-{number}"
-        names.add(name)
+        name = _unlike(_name(log, number, redacted=bool(request.removed)), names)
         page = None if folder is None else folder / (name + _PAGE)
-        told, text = found.report, _written(found, page, tiles)
+        another = None if page is None else overwriting_another(page, PAGES, "a page")
+        told, text = found.report, another or _written(found, page, tiles)
         if isinstance(text, Refusal):
             code = code or refuse(text)
             continue
@@ -186,7 +188,7 @@ def _several(
             out_json(_line(told, page))
         else:
             out(f"{number} of {len(logs)}: {name}: {told.verdict}, {told.ending}")
-        entries.append(LogbookEntry(name + _PAGE, told.without_log()))
+        entries.append(LogbookEntry(f"./{quote(name + _PAGE)}", told.without_log()))
         redactions += [found.redaction] if found.redaction is not None else []
         code = code or found.code
     if folder is not None:
@@ -195,9 +197,22 @@ def _several(
         left = next((left for each in redactions if (left := each.left(text)) is not None), None)
         if left is not None:
             return refuse(left)
+        another = overwriting_another(folder / _INDEX, PAGES, "a page")
+        if another is not None:
+            return refuse(another)
         replace_inside(folder / _INDEX, text.encode("utf-8"))
         say(f"{len(entries)} flights: open {folder / _INDEX}")
     return code
+
+
+def _unlike(name: str, names: set[str]) -> str:
+    """A name that differs from all others, also where capitals do not count; it becomes one of them."""
+    found, number = name, 1
+    while found.casefold() in names:
+        number += 1
+        found = f"{name}-{number}"
+    names.add(found.casefold())
+    return found
 
 
 def _reported(request: FlightReportRequest) -> ReportedFlight | Refusal:

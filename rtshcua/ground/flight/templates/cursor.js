@@ -79,12 +79,13 @@
     });
     slider.addEventListener("input", () => show(Number(slider.value)));
     document.getElementById("cursor-bar").hidden = false;
-    slider.value = at ?? 0;
+    slider.value = at ?? track?.t[0] ?? Math.min(...signals.map(each => each.t[0] ?? 0));
     show(Number(slider.value));
   };
-  begin(null);
+  const newest = () => document.getElementById("cursor").max;
+  begin(document.getElementById("growing-note") ? newest() : null);
   // the page grew: `detail` is where the cursor was, null if it follows the flight
-  addEventListener("flight", event => begin(event.detail ?? document.getElementById("cursor").max));
+  addEventListener("flight", event => begin(event.detail ?? newest()));
   // a link to a record opens what it is in
   const open = () => {
     const at = location.hash && document.getElementById(location.hash.slice(1));
@@ -92,5 +93,12 @@
     if (at) at.scrollIntoView({ block: "center" });
   };
   addEventListener("hashchange", open);
+  // paper has nothing to open: each decision is printed in full
+  let closed = [];
+  addEventListener("beforeprint", () => {
+    closed = [...document.querySelectorAll("details.decision:not([open])")];
+    for (const each of closed) each.open = true;
+  });
+  addEventListener("afterprint", () => { for (const each of closed) each.open = false; });
   open();
 })();

@@ -61,7 +61,9 @@
       source = trustRoot ? `the root key of the trust root in ${chosen.name}` : `the key in ${chosen.name}`;
       state("unverified", element("p", `The key to verify with is ${source}. ${SAME_SOURCE}`));
     } catch {
-      if (mine === current) state("unverified", element("p", `${chosen.name} is neither a root key in hexadecimal nor a valid trust root.`));
+      if (mine !== current) return;
+      input.value = ""; // not the key of an earlier file
+      state("unverified", element("p", `${chosen.name} is neither a root key in hexadecimal nor a valid trust root.`));
     }
   };
 

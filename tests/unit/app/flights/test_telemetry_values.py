@@ -88,6 +88,14 @@ def test_altitude_has_the_datum_of_its_source(tmp_path: Path) -> None:
         assert series.datum == datum
 
 
+def test_frame_within_a_damaged_one_is_not_read_in_its_place(tmp_path: Path) -> None:
+    hidden, whole = frame(heartbeat()), frame(position())
+    damaged = whole[:1] + bytes([len(hidden)]) + whole[2:10] + hidden + b"\0\0"
+    found = read(tmp_path, [(0, hidden), (1, whole), (2, damaged), (3, whole)])
+    assert [each.t_us for each in found.track] == [1 * S, 3 * S]
+    assert read(tmp_path, [(1, damaged), (2, whole)]).track[0].t_us == 2 * S
+
+
 # ------------------------------------------------------------------------------------------------------ silences
 
 

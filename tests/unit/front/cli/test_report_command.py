@@ -2,8 +2,11 @@
 
 import io
 import json
+import os
+import re
 import sys
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -64,7 +67,7 @@ def test_several_flights_make_a_logbook(runs: Path, capsys: pytest.CaptureFixtur
     assert sorted(each.name for each in Path("book").iterdir()) == ["a.html", "b.html", "index.html"]
     index = Path("book/index.html").read_text(encoding="utf-8")
     assert index.count("<tr>") == 3  # the head, and one for each
-    assert 'href="a.html"' in index
+    assert 'href="./a.html"' in index
     assert "1 of 2" in index  # missions completed
     capsys.readouterr()
 
@@ -104,7 +107,7 @@ def test_redacted_pages_and_their_logbook_have_numbers_for_names(
     assert main(["report", str(runs), "-o", "pages", "--redact", "position,names", *ROOT, *AT]) == ExitCode.OK
     assert sorted(each.name for each in (here / "pages").iterdir()) == ["flight-1.html", "flight-2.html", "index.html"]
     index = Path("pages/index.html").read_text(encoding="utf-8")
-    assert 'href="flight-1.html"' in index
+    assert 'href="./flight-1.html"' in index
     assert not any(gone in index for gone in ("quad-07", "inspect_bridge_a", "bridge"))
     assert "left out" in index
     monkeypatch.setattr(sys, "stdout", Terminal())
@@ -156,3 +159,63 @@ def test_log_is_not_overwritten(runs: Path) -> None:
     before = (runs / "a" / "log.jsonl").read_bytes()
     assert main(["report", str(runs / "a"), "-o", str(runs / "a" / "log.jsonl"), *ROOT]) != ExitCode.OK
     assert (runs / "a" / "log.jsonl").read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["bundle.json", "page.html"])
+def test_file_that_is_no_page_is_not_overwritten(name: str, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path(name).write_text('{"of": "somebody"}', encoding="utf-8")
+    assert main(["report", str(runs / "a"), "-o", name, *ROOT]) != ExitCode.OK
+    assert "is not a page, and is not overwritten by one" in capsys.readouterr().err
+    assert Path(name).read_text(encoding="utf-8") == '{"of": "somebody"}'
+
+
+@pytest.mark.parametrize("name", ["a.html", "index.html"])
+def test_logbook_overwrites_pages_alone(name: str, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("book").mkdir()
+    for _ in range(2):  # its own pages again
+        assert main(["report", str(runs), "-o", "book", *ROOT]) == ExitCode.OK
+    Path("book", name).write_text("notes", encoding="utf-8")
+    assert main(["report", str(runs), "-o", "book", *ROOT]) != ExitCode.OK
+    assert f"`book/{name}` is not a page" in capsys.readouterr().err
+    assert Path("book", name).read_text(encoding="utf-8") == "notes"
+
+
+def test_logbook_links_pages_of_any_name(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    odd = [b"index", b"INDEX", b"50%#a?b", b"javascript:x", b"\xff", b"a b"]
+    for name in odd:
+        flight_reports.completed(here / "odd" / os.fsdecode(name))
+    assert main(["report", "odd", "-o", "book", "--json", *ROOT]) == ExitCode.OK
+    pages = [Path(json.loads(line)["page"]) for line in capsys.readouterr().out.splitlines()]
+    linked = re.findall(r'<a href="([^"]+)"><time', Path("book/index.html").read_text(encoding="utf-8"))
+    assert all(each.startswith("./") for each in linked)
+    assert {Path("book", unquote(each)) for each in linked} == set(pages)
+    assert len({each.name.casefold() for each in (*pages, Path("index.html"))}) == len(odd) + 1
+    assert all(each.is_file() for each in pages)
+
+
+def test_log_named_twice_is_one_flight(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(runs / "a"), str(runs / "a" / "log.jsonl"), "-o", "a.html", *ROOT]) == ExitCode.OK
+    assert "written to a.html" in capsys.readouterr().out
+
+
+def test_failed_flight_says_so_first_and_counts_in_no_total(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = (runs / "a" / "log.jsonl").read_bytes()
+    Path("bad").mkdir()
+    Path("bad/log.jsonl").write_bytes(data.replace(b'"event":"succeeded"', b'"event":"failed"', 1))
+    assert main(["report", "bad", str(runs / "a"), "-o", "book", *ROOT]) != ExitCode.OK
+    page = Path("book/bad.html").read_text(encoding="utf-8")
+    assert page.index("nothing on this page is proven") < page.index("What was asked")
+    assert "1 of 2" in Path("book/index.html").read_text(encoding="utf-8")
+    assert "nothing on this page is proven" not in Path("book/a.html").read_text(encoding="utf-8")
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("redacted", [[], ["--redact", "names"]])
+def test_log_that_is_too_large_is_not_embedded_in_part(
+    redacted: list[str], runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rtshcua.app.flights.flight_report.MOST_OCTETS", 10_000)
+    assert main(["report", str(runs / "a"), *redacted, *ROOT]) == ExitCode.OK
+    page = capsys.readouterr().out
+    assert "the log is too large to be embedded" in page
+    assert "application/gzip+base64" not in page

@@ -166,6 +166,10 @@ class FlownPlace(NamedTuple):
     ground: int | None = None
 
 
+#: the kinds of marks of a flight
+EVENTS: Final = frozenset({"event", "refused"})
+
+
 class FlightMark(NamedTuple):
     """Something that happened in flight, such as a decision: a time and a place, its label, and its kind: `event`, or
     `refused` for what was denied or went wrong.

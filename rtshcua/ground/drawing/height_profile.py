@@ -23,6 +23,7 @@ from rtshcua.ground.drawing.canvas import (
     told_distance,
 )
 from rtshcua.ground.drawing.drawn_site import (
+    EVENTS,
     NOT_REFUSED,
     FlownWay,
     LeftAirspace,
@@ -407,6 +408,8 @@ def _keys(site: Site, drawn: _DrawnHeights, bands: Sequence[ZoneBand]) -> Iterat
         yield DrawingKey("failed-mark", "where it leaves the airspace first")
     if drawn.flown:
         yield DrawingKey("flown", "the flown heights")
+    if EVENTS & {mark.kind for mark in drawn.marks}:
+        yield DrawingKey("event-mark", "a decision, with the number of its record")
     if site.return_altitude:
         yield DrawingKey("returns", "the height to which a return climbs")
     yield DrawingKey("ground", "the ground below" if drawn.ground else "the height of home")

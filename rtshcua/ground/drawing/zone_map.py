@@ -28,6 +28,7 @@ from rtshcua.ground.drawing.canvas import (
     told_distance,
 )
 from rtshcua.ground.drawing.drawn_site import (
+    EVENTS,
     NOT_REFUSED,
     FlownWay,
     PlannedLeg,
@@ -434,6 +435,8 @@ def _way_keys(site: Site, way: _DrawnWay) -> Iterator[DrawingKey]:
         yield DrawingKey("failed-mark", "where it leaves the airspace first")
     if way.flown:
         yield DrawingKey("flown", "the flown track")
+    if kinds & EVENTS:
+        yield DrawingKey("event-mark", "a decision, with the number of its record")
 
 
 def _failed(on: Canvas, legs: Sequence[PlannedLeg], steps: Container[int]) -> Iterator[list[tuple[float, float]]]:

@@ -42,7 +42,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_page_is_written(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(runs / "a"), "-o", "page.html", *ROOT, *AT]) == ExitCode.OK
     assert "verified, completed: written to page.html" in capsys.readouterr().out
-    assert "The mission was completed." in Path("page.html").read_text(encoding="utf-8")
+    page = Path("page.html").read_text(encoding="utf-8")
+    assert "The mission was completed." in page
+    assert "a decision, with the number of its record" in page
 
 
 def test_page_goes_to_a_pipe_and_to_a_file_of_its_run_on_a_terminal(

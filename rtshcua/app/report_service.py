@@ -91,9 +91,10 @@ def check_report(request: ReportRequest) -> CheckedReport | Refusal:
     sources: dict[str, Source] = {}
     for each in roots:
         sources |= each.reading.program.sources
-    imported = None if target is None else overwriting_a_source(target, sources, "a page")
-    if imported is not None:
-        return imported
+    if target is not None:
+        unfit = overwriting_a_source(target, sources, "a page") or overwriting_another(target, PAGES, "a page")
+        if unfit is not None:
+            return unfit
     trials = _trials(roots, files)
     versions = (
         compared.finding
@@ -116,9 +117,7 @@ def _refusal(target: Path | None, files: Sequence[Path]) -> Refusal | None:
         return Refusal("output", f"`{target}` is not a regular file, and is not overwritten by a page")
     if target is not None and not target.parent.is_dir():
         return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
-    if target is None:
-        return None
-    return overwriting_a_source(target, files, "a page") or overwriting_another(target, PAGES, "a page")
+    return None if target is None else overwriting_a_source(target, files, "a page")
 
 
 class _Trials(NamedTuple):

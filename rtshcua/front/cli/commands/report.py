@@ -1,6 +1,5 @@
 """`rtshcua report`: flights as pages to look at, and a logbook of several."""
 
-import gc
 import json
 import os
 import re
@@ -9,28 +8,24 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
-from urllib.parse import quote
 
 import typer
 
-from rtshcua.adapters.store.writing import make_folder, replace_inside
 from rtshcua.app.documents import no_log
-from rtshcua.app.files import PAGES, overwriting_another
-from rtshcua.app.flights.flight_report import FlightReportRequest, ReportedFlight, flight_report
-from rtshcua.app.flights.redaction import REDACTABLE, Redaction, redaction_of
+from rtshcua.app.flights.flight_report import FlightReportRequest
+from rtshcua.app.flights.redaction import REDACTABLE, redaction_of
+from rtshcua.app.flights.report_pages import FlightPage, Logbook, default_target, flight_page, target_of
 from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_meant
 from rtshcua.app.pin import trusted
-from rtshcua.app.wording import moment, utc
+from rtshcua.app.wording import moment
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.render.progress import octets_of
 from rtshcua.front.cli.stdout import out, out_json, out_rendered
-from rtshcua.ground.flight.flight_content import FlightReport, as_plain
+from rtshcua.ground.flight.flight_content import as_plain
 
 app = typer.Typer(add_completion=False)
-
-_PAGE, _INDEX = ".html", "index.html"
 
 Runs = Annotated[list[Path], typer.Argument(metavar="RUN...", help="run folders, parents of these, or logs")]
 Output = Annotated[
@@ -121,119 +116,51 @@ def _target(output: Path | None, logs: Sequence[Path], *, redacted: bool, as_jso
     if output is None:
         if as_json or (not several and not sys.stdout.isatty()):
             return None
-        output = Path("logbook") if several else Path(_name(logs[0], 1, redacted=redacted) + _PAGE)
+        output = default_target(logs, redacted=redacted)
     elif str(output) == "-" and not several:
         return None
-    if several:
-        if output.exists() and not output.is_dir():
-            return Refusal("output", f"`{output}` is a file; several flights make a folder of pages")
-        return output
-    if output.is_dir():
-        output /= _name(logs[0], 1, redacted=redacted) + _PAGE
-    if output.exists() and not output.is_file():
-        return Refusal("output", f"`{output}` is not a regular file, and is not overwritten by a page")
-    if not output.parent.is_dir():
-        return Refusal("output", f"there is no folder `{output.parent}` to write to", code=ExitCode.INPUT)
-    return overwriting_another(output, PAGES, "a page") or output
-
-
-def _name(log: Path, number: int, *, redacted: bool) -> str:
-    """The name of a page: that of the run folder, or of the log; of a redacted page only a number."""
-    if redacted:
-        return f"flight-{number}"
-    folder = log.resolve().parent.name
-    name = folder if log.name == "log.jsonl" and folder else log.stem
-    return os.fsencode(name).decode("utf-8", "replace")
+    return target_of(output, logs, redacted=redacted)
 
 
 def _one(request: FlightReportRequest, target: Path | None, tiles: str, *, as_json: bool) -> ExitCode:
-    found = _reported(request)
-    if isinstance(found, Refusal):
-        return refuse(found)
-    told, text = found.report, _written(found, target, tiles)
-    if isinstance(text, Refusal):
-        return refuse(text)
+    with octets_of("verifying", request.log.stat().st_size) as progress:
+        made = flight_page(request, target, tiles, progress)
+    if isinstance(made, Refusal):
+        return refuse(made)
     if as_json:
-        out_json(_line(told, target))
+        out_json(_line(made))
     elif target is None:
-        out_rendered(text, end="")
+        out_rendered(made.text, end="")
     else:
-        out(f"{told.verdict}, {told.ending}: written to {target}")
-    return found.code
+        out(f"{made.report.verdict}, {made.report.ending}: written to {target}")
+    return made.code
 
 
 def _several(
     logs: Sequence[Path], request: FlightReportRequest, folder: Path | None, tiles: str, *, as_json: bool
 ) -> ExitCode:
-    from rtshcua.ground.flight.logbook_page import LogbookEntry, logbook_page
-
-    if folder is not None:
-        make_folder(folder)
-    entries: list[LogbookEntry] = []
-    redactions: list[Redaction] = []
-    code, names = ExitCode.OK, {Path(_INDEX).stem}
-    for number, log in enumerate(logs, 1):
-        found = _reported(request._replace(log=log))
-        if isinstance(found, Refusal):
-            code = code or refuse(found)
+    logbook, code, number = Logbook(folder, request, tiles), ExitCode.OK, 0
+    for log in logs:
+        with octets_of("verifying", log.stat().st_size) as progress:
+            made = logbook.add(log, progress)
+        if isinstance(made, Refusal):
+            code = code or refuse(made)
             continue
-        name = _unlike(_name(log, number, redacted=bool(request.removed)), names)
-        page = None if folder is None else folder / (name + _PAGE)
-        another = None if page is None else overwriting_another(page, PAGES, "a page")
-        told, text = found.report, another or _written(found, page, tiles)
-        if isinstance(text, Refusal):
-            code = code or refuse(text)
-            continue
+        number += 1
+        code = code or made.code
         if as_json:
-            out_json(_line(told, page))
+            out_json(_line(made))
         else:
-            out(f"{number} of {len(logs)}: {name}: {told.verdict}, {told.ending}")
-        entries.append(LogbookEntry(f"./{quote(name + _PAGE)}", told.without_log()))
-        redactions += [found.redaction] if found.redaction is not None else []
-        code = code or found.code
-    if folder is not None:
-        made_by = entries[0].flight.made_by if entries else "rtshcua"
-        text = logbook_page(entries, utc(request.made_at_us), made_by)
-        left = next((left for each in redactions if (left := each.left(text)) is not None), None)
-        if left is not None:
-            return refuse(left)
-        another = overwriting_another(folder / _INDEX, PAGES, "a page")
-        if another is not None:
-            return refuse(another)
-        replace_inside(folder / _INDEX, text.encode("utf-8"))
-        say(f"{len(entries)} flights: open {folder / _INDEX}")
+            name = log.parent.name if made.file is None else made.file.stem
+            out(f"{number} of {len(logs)}: {name}: {made.report.verdict}, {made.report.ending}")
+    index = logbook.finish()
+    if isinstance(index, Refusal):
+        return refuse(index)
+    if index is not None:
+        say(f"{number} flights: open {index}")
     return code
 
 
-def _unlike(name: str, names: set[str]) -> str:
-    """A name that differs from all others, also where capitals do not count; it becomes one of them."""
-    found, number = name, 1
-    while found.casefold() in names:
-        number += 1
-        found = f"{name}-{number}"
-    names.add(found.casefold())
-    return found
-
-
-def _reported(request: FlightReportRequest) -> ReportedFlight | Refusal:
-    with octets_of("verifying", request.log.stat().st_size) as progress:
-        return flight_report(request, progress)
-
-
-def _written(found: ReportedFlight, target: Path | None, tiles: str) -> str | Refusal:
-    from rtshcua.ground.flight.flight_page import page
-
-    gc.freeze()  # what is there stays until the end: looking through it again and again takes a third of the time
-    text = page(found.report, tiles=tiles)
-    gc.unfreeze()
-    left = None if found.redaction is None else found.redaction.left(text)
-    if left is not None:
-        return left
-    if target is not None:
-        replace_inside(target, text.encode("utf-8"))
-    return text
-
-
-def _line(found: FlightReport, target: Path | None) -> str:
-    content = as_plain(found.without_log())
-    return json.dumps({"page": None if target is None else str(target), **content}, ensure_ascii=False)
+def _line(made: FlightPage) -> str:
+    content = as_plain(made.report.without_log())
+    return json.dumps({"page": None if made.file is None else str(made.file), **content}, ensure_ascii=False)

@@ -120,7 +120,7 @@ def test_redacted_pages_and_their_logbook_have_numbers_for_names(
 def test_logbook_with_something_left_is_not_written(
     runs: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rtshcua.ground.flight.logbook_page.logbook_page", lambda *_: "<p>over Bridge-A</p>")
+    monkeypatch.setattr("rtshcua.app.flights.report_pages.logbook_page", lambda *_: "<p>over Bridge-A</p>")
     assert main(["report", str(runs), "-o", "pages", "--redact", "names", *ROOT]) == ExitCode.FAULT
     assert "bridge_a" in capsys.readouterr().err
     assert not Path("pages/index.html").exists()

@@ -122,9 +122,15 @@ def test_revoked_key_binds_nothing(run: Path) -> None:
     assert refused.value.slug == "revoked-key"
 
 
-def test_control_characters_of_a_file_name_reach_no_terminal(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("wrong", "code"), [({"file": "\x1b[2Ja\n.ulg"}, ExitCode.INPUT), ({"source": "\x1b[1m"}, ExitCode.OK)]
+)
+def test_control_characters_of_a_binding_reach_no_terminal(
+    wrong: dict[str, str], code: ExitCode, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path, binding = content(run)
-    path.write_bytes(sign_autopilot_binding(replace(binding, file="\x1b[2Ja\n.ulg", source="\x1b[1m"), LOG_KEY))
-    assert app.main(["show", str(path)]) == ExitCode.OK
+    path.write_bytes(sign_autopilot_binding(replace(binding, **wrong), LOG_KEY))
+    assert app.main(["show", str(path)]) == code
     assert app.main(["verify-log", "--root", ROOT, str(run)]) == ExitCode.OK
-    assert "\x1b" not in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert "\x1b" not in told.out + told.err

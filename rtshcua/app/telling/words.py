@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, degrees, isqrt
+from typing import TYPE_CHECKING
 
 from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.outline import rings as outline
-from rtshcua.ground.why.trace import ReadValue
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, Link, MotionKind, Parameter, SourceKind
 from rtshcua.model.flat.mission import Invocation, Plan
@@ -20,6 +20,9 @@ from rtshcua.onboard.calls import call as call
 from rtshcua.onboard.calls import geographic as geographic
 from rtshcua.onboard.calls import place as place
 from rtshcua.onboard.calls import quantity as quantity
+
+if TYPE_CHECKING:  # a run, which uses other words, loads nothing of the ground
+    from rtshcua.ground.why.trace import ReadValue
 
 _MINUTE = 60_000_000
 _MOTIONS = {
@@ -176,7 +179,7 @@ def monitor(monitor: Monitor) -> str:
             return f"falling `{monitor.when.text}`"
 
 
-def read_value(policy: Policy, read: ReadValue) -> str:
+def read_value(policy: Policy, read: "ReadValue") -> str:
     """The value of a signal that a decision read."""
     assert read.signal is not None
     known = [value for value in read.values if value is not None]

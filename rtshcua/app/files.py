@@ -85,9 +85,9 @@ _MOST_BLANK: Final = 256
 
 def overwriting_another(target: Path, begins: tuple[bytes, ...], what: str) -> Refusal | None:
     """The refusal if `target` is a file that is neither empty nor of the kind to be written, by how it begins; else
-    None. Raises OSError.
+    None, also for a symbolic link, which is replaced itself. Raises OSError.
     """
-    if not target.is_file():
+    if target.is_symlink() or not target.is_file():
         return None
     with open_regular(target) as file:
         head = file.read(_MOST_BLANK)

@@ -155,7 +155,7 @@ OVER_NAMES = [
     *(((("lint", "{source}", "--format", form), None)) for form in ("github", "sarif", "junit")),
     (("lint", "{source}", "--fix", "--diff"), None), (("lint", "{source}", "--statistics"), None),
     (("test", "{source}"), None), (("test", "{source}", "--json"), None),
-    (("docs", "{source}", "-o", "{made}"), ExitCode.OK), (("docs", "{source}", "--json"), ExitCode.OK),
+    (("docs", "{source}", "-o", "{made}.html"), ExitCode.OK), (("docs", "{source}", "--json"), ExitCode.OK),
     (("init", "{folder}", "--name", "site"), ExitCode.OK),
     (("init", "{folder}2", "--name", "site", "--json"), ExitCode.OK),
     (("keys", "link", "{made}.key"), ExitCode.OK),

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from rtshcua.app.files import PAGES, PICTURES, overwriting_a_source, overwriting_another
+from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def unfit_place(
 ) -> Refusal | None:
     """The refusal if no page or picture (`what`) can be written to `target`."""
     if not target.parent.is_dir():
-        return Refusal("output", f"there is no folder `{target.parent}` to write to")
+        return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
     if target.exists() and not target.is_file():
         return Refusal("output", f"`{target}` is not a regular file, and is not overwritten by {what}")
     return overwriting_a_source(target, files, what) or overwriting_another(target, begins, what)

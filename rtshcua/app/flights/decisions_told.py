@@ -101,7 +101,7 @@ class DecisionWords:
                     )
                 passing = tuple(map(words.would_pass, found.trace.nearest))
             elif isinstance(found, LinkExplained):
-                passing = tuple(
+                chain = tuple(
                     f"{each.text}: {'may fly' if each.admissible else 'may not'}" for each in found.trace.chain
                 )
         subject = self._names.subject(record.kind, record.step, record.link)

@@ -94,7 +94,7 @@ def name_for(run: Path, format: str) -> Path:
 
 def export(request: ExportRequest) -> ExportedFile | Refusal:
     """Make the file; it is not written here. Raises OSError."""
-    refused = accepted(request.format) or _unwritable(request.target, log_of(request.run))
+    refused = accepted(request.format) or _unwritable(request.target, log_of(request.run), request.format)
     if refused is not None:
         return refused
     log = log_of(request.run)
@@ -124,7 +124,7 @@ def export(request: ExportRequest) -> ExportedFile | Refusal:
     return ExportedFile(made.data, made.points, made.datum, status, tuple(warnings))
 
 
-def _unwritable(target: Path | None, log: Path) -> Refusal | None:
+def _unwritable(target: Path | None, log: Path, format: str) -> Refusal | None:
     if target is None:
         return None
     if target.is_dir():
@@ -139,6 +139,9 @@ def _unwritable(target: Path | None, log: Path) -> Refusal | None:
     if kind in _EVIDENCE or target.samefile(log):
         name = "the log" if kind is None else kind.name
         return Refusal("output", f"`{target}` is {name}, and is not overwritten by an export", "name another file")
+    if target.suffix.lower() != f".{format}" and target.stat().st_size and not target.is_symlink():
+        what = f"`{target}` exists and is not named as {format}, and is not overwritten by it"
+        return Refusal("output", what, f"name a file that ends in `.{format}`")
     return None
 
 

@@ -72,11 +72,13 @@ class Logbook:
         self._names = {Path(_INDEX).stem}
         self._entries: list[LogbookEntry] = []
         self._redactions: list[Redaction] = []
+        self._unread = 0
 
     def add(self, log: Path, progress: Progress = lambda _: None) -> FlightPage | Refusal:
         """Add the page of the next flight. Raises OSError."""
         found = flight_report(self._request._replace(log=log), progress)
         if isinstance(found, Refusal):
+            self._unread += 1
             return found
         name = self._unlike(_name(log, len(self._entries) + 1, redacted=bool(self._request.removed))) + _PAGE
         file = None if self._folder is None else self._folder / name
@@ -93,7 +95,8 @@ class Logbook:
         if self._folder is None:
             return None
         made_by = self._entries[0].flight.made_by if self._entries else "rtshcua"
-        text, index = logbook_page(self._entries, utc(self._request.made_at_us), made_by), self._folder / _INDEX
+        text = logbook_page(self._entries, utc(self._request.made_at_us), made_by, self._unread)
+        index = self._folder / _INDEX
         left = next((left for each in self._redactions if (left := each.left(text)) is not None), None)
         refused = left or overwriting_another(index, PAGES, _A_PAGE)
         if refused is not None:

@@ -48,8 +48,8 @@ def totals(flights: Sequence[FlightReport]) -> LogbookTotals:
     )
 
 
-def logbook_page(entries: Sequence[LogbookEntry], made_at: str, made_by: str) -> str:
-    """Render a logbook, the latest flight first."""
+def logbook_page(entries: Sequence[LogbookEntry], made_at: str, made_by: str, unread: int = 0) -> str:
+    """Render a logbook, the latest flight first; it says how many other logs could not be read."""
     scripts = [script("sort.js")]
     ordered = sorted(entries, key=lambda each: each.flight.begun_utc_us, reverse=True)
     return rendered(
@@ -57,6 +57,8 @@ def logbook_page(entries: Sequence[LogbookEntry], made_at: str, made_by: str) ->
         "logbook.html",
         entries=ordered,
         totals=totals([each.flight for each in ordered]),
+        unread=unread,
+        simulated=sum(each.flight.simulated for each in entries),
         made_at=made_at,
         made_by=made_by,
         scripts=[Markup(text) for text in scripts],

@@ -17,7 +17,7 @@ from rtshcua.app.flights.redaction import REDACTABLE, redaction_of
 from rtshcua.app.flights.report_pages import FlightPage, Logbook, default_target, flight_page, target_of
 from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_meant
 from rtshcua.app.pin import trusted
-from rtshcua.app.wording import moment
+from rtshcua.app.wording import many, moment
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse, say
@@ -144,7 +144,8 @@ def _several(
         with octets_of("verifying", log.stat().st_size) as progress:
             made = logbook.add(log, progress)
         if isinstance(made, Refusal):
-            code = code or refuse(made)
+            refused = refuse(made)
+            code = code or refused
             continue
         number += 1
         code = code or made.code
@@ -157,7 +158,7 @@ def _several(
     if isinstance(index, Refusal):
         return refuse(index)
     if index is not None:
-        say(f"{number} flights: open {index}")
+        say(f"{many(number, 'flight')}: open {index}")
     return code
 
 

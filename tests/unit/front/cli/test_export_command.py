@@ -215,3 +215,11 @@ def test_help_names_the_formats(capsys: pytest.CaptureFixture[str]) -> None:
     assert export("--help") == ExitCode.OK
     said = capsys.readouterr().out
     assert all(to in said for to in FORMATS)
+
+
+def test_file_with_another_name_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("notes.md").write_text("notes", encoding="utf-8")
+    assert "not overwritten" in refused(capsys, f"runs/{RUN}", "--to", "kml", "-o", "notes.md")
+    assert Path("notes.md").read_text(encoding="utf-8") == "notes"
+    for name in ("new.md", "flight.KML", "flight.KML"):
+        assert export(f"runs/{RUN}", "--to", "kml", "-o", name) == ExitCode.OK

@@ -107,22 +107,22 @@ def test_json_names_the_picture(at: Path, command: str, name: str, capsys: pytes
 
 @pytest.mark.parametrize("command", ["check", "compile"])
 @pytest.mark.parametrize(
-    ("target", "said"),
+    ("target", "code", "said"),
     [
-        ("near.png", "is not the name of an SVG file"),
-        ("near", "is not the name of an SVG file"),
-        ("near.rts", "is not the name of an SVG file"),
-        ("nowhere/near.svg", "there is no folder"),
-        ("folder.svg", "is not a regular file"),
-        ("link.svg", "is one of the sources"),
+        ("near.png", ExitCode.USAGE, "is not the name of an SVG file"),
+        ("near", ExitCode.USAGE, "is not the name of an SVG file"),
+        ("near.rts", ExitCode.USAGE, "is not the name of an SVG file"),
+        ("nowhere/near.svg", ExitCode.INPUT, "there is no folder"),
+        ("folder.svg", ExitCode.USAGE, "is not a regular file"),
+        ("link.svg", ExitCode.USAGE, "is one of the sources"),
     ],
 )
 def test_unfit_target_is_refused(
-    at: Path, command: str, target: str, said: str, capsys: pytest.CaptureFixture[str]
+    at: Path, command: str, target: str, code: ExitCode, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (at / "folder.svg").mkdir()
     (at / "link.svg").hardlink_to(at / "near.rts")
-    assert main([command, "near.rts", "--picture", target]) == ExitCode.USAGE
+    assert main([command, "near.rts", "--picture", target]) == code
     assert said in " ".join(capsys.readouterr().err.split())
     assert (at / "near.rts").read_text() == GOOD
     assert not (at / "near.bundle").exists()

@@ -221,3 +221,15 @@ def test_log_that_is_too_large_is_not_embedded_in_part(
     page = capsys.readouterr().out
     assert "the log is too large to be embedded" in page
     assert "application/gzip+base64" not in page
+
+
+def test_logbook_names_each_log_that_it_cannot_read(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    begun = (runs / "a" / "log.jsonl").read_bytes()[:2_000]
+    for name in ("cut", "short"):
+        Path(name).mkdir()
+        Path(name, "log.jsonl").write_bytes(begun)
+    assert main(["report", "cut", str(runs / "a"), "short", "-o", "book", *ROOT]) == ExitCode.EVIDENCE
+    told = capsys.readouterr().err
+    assert all(f"`{name}/log.jsonl`" in told for name in ("cut", "short"))
+    assert "1 flight: open book/index.html" in told
+    assert "2 more could not be read" in Path("book/index.html").read_text(encoding="utf-8")

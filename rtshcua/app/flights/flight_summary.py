@@ -135,6 +135,8 @@ class FlightSummary:
         )
         if not any(self._effects("dispatched")):
             told = f"Nothing: no command was sent to the vehicle in {words.duration(lasted_us // 100_000 * 100_000)}"
+        if self._flight.telemetry is None and self._flight.names_telemetry:
+            return f"{told}. The telemetry that the log names is missing, so its way is not known."
         if self._track is None:
             return f"{told}. There is no telemetry of its way."
         highest = max(each.above_home for each in self._track.points)

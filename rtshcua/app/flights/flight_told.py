@@ -122,7 +122,8 @@ def _gaps_of_log(flight: Flight, report: LogReport | None) -> Iterator[GapView]:
 def _gaps_of_telemetry(flight: Flight) -> Iterator[GapView]:
     telemetry = flight.telemetry
     if telemetry is None:
-        yield GapView("telemetry", "there is none: no track, no signals")
+        what = "the file that the log names is not beside it" if flight.names_telemetry else "there is none"
+        yield GapView("telemetry", f"{what}: no track, no signals")
         return
     if telemetry.damaged is not None:
         yield GapView("telemetry", f"the file breaks off at octet {telemetry.damaged}")

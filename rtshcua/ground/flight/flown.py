@@ -8,7 +8,7 @@ here: only the log is evidence, and the telemetry is what was heard on the link.
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from rtshcua.evidence.records import AnyRecord, Genesis
+from rtshcua.evidence.records import AnyRecord, Close, Genesis
 from rtshcua.ground.flight.log_times import LogSegment, since_begun
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
@@ -112,6 +112,12 @@ class Flight(NamedTuple):
     segments: tuple[LogSegment, ...]
     lasted_us: int
     steps: tuple[Invocation, ...]
+
+    @property
+    def names_telemetry(self) -> bool:
+        """Whether the end of the log names the telemetry that was recorded beside it."""
+        last = self.records[-1]
+        return isinstance(last, Close) and last.tlog is not None
 
     def since_begun(self, record: AnyRecord) -> int:
         """The time of a record of the log since its first one."""

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import re
+import shutil
 import sys
 from pathlib import Path
 from urllib.parse import unquote
@@ -233,3 +234,16 @@ def test_logbook_names_each_log_that_it_cannot_read(runs: Path, capsys: pytest.C
     assert all(f"`{name}/log.jsonl`" in told for name in ("cut", "short"))
     assert "1 flight: open book/index.html" in told
     assert "2 more could not be read" in Path("book/index.html").read_text(encoding="utf-8")
+
+
+def test_telemetry_that_was_removed_is_told_as_missing(
+    runs: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(runs / "a", here / "a")
+    Path("a/telemetry.tlog").unlink()
+    assert main(["report", "a", "--json", *ROOT]) == ExitCode.OK
+    told = json.loads(capsys.readouterr().out)
+    assert "The telemetry that the log names is missing" in told["summary"][2]["answer"]
+    assert {"what": "telemetry", "told": "the file that the log names is not beside it: no track, no signals"} in told[
+        "gaps"
+    ]

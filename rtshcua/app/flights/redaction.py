@@ -78,7 +78,7 @@ def redaction_of(text: str | None) -> tuple[str, ...] | Refusal:
     wrong = [each for each in named if each not in REDACTABLE]
     if wrong:
         help = "accepted: `position`, `names`, or both: `position,names`"
-        return Refusal("usage", f"`{wrong[0]}` cannot be left out", help, code=ExitCode.USAGE)
+        return Refusal("usage", f"`{wrong[0]}` is nothing that a page can leave out", help, code=ExitCode.USAGE)
     return tuple(each for each in REDACTABLE if each in named)
 
 

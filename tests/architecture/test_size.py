@@ -12,7 +12,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
     "modules": 873,
-    "code lines": 103_810,  # rises with each feature: last the report of a flight
+    "code lines": 103_820,  # rises with each feature: last the report of a flight
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 70,

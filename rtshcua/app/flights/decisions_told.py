@@ -1,5 +1,6 @@
 """The decisions of a flight in words: what decided, what it read, and what would have passed."""
 
+from collections.abc import Iterable
 from typing import Final
 
 from rtshcua.app.documents import recorded_replacement
@@ -15,8 +16,9 @@ from rtshcua.evidence.records import DecisionRecord, Effect
 from rtshcua.ground.editor.keyword_help import REASONS
 from rtshcua.ground.flight.flight_content import DecisionView, ReadSignal
 from rtshcua.ground.why.logged_decisions import context_of, state_of
-from rtshcua.ground.why.trace import ReadValue, read_values
+from rtshcua.ground.why.trace import read_values
 from rtshcua.model.decision import Decisive
+from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import Policy, Rule
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.calls import argument
@@ -79,62 +81,71 @@ class DecisionWords:
         return places.place(source, start)
 
     def _view(self, record: DecisionRecord, t_us: int) -> DecisionView:
-        reads: tuple[ReadSignal, ...] = ()
-        passing: tuple[str, ...] = ()
-        clause = "" if record.clause is None else f"`{' '.join(record.clause.split())}`"
+        clause = "" if record.clause is None else _quoted(record.clause)
         place = "" if record.clause_at is None else self._place(record.step, *record.clause_at[:2])
-        chain: tuple[str, ...] = ()
-        self.unexplained += self._explained >= MOST_EXPLAINED
-        if self._explained < MOST_EXPLAINED:
-            self._explained += 1
-            found = explained(record, self._subject)
-            if isinstance(found, StepExplained):
-                clause = words.quoted(
-                    self._policy, found.invocation.invocation, found.trace.decision.clause
-                ) or clause  # fmt: skip
-                reads = self._reads(record, found)
-                permit = _permit(found)
-                if permit is not None:
-                    clause, place = (
-                        f"`{' '.join(permit.text.split())}`",
-                        self._place(record.step, permit.source, permit.start),
-                    )
-                passing = tuple(map(words.would_pass, found.trace.nearest))
-            elif isinstance(found, LinkExplained):
-                chain = tuple(
-                    f"{each.text}: {'may fly' if each.admissible else 'may not'}" for each in found.trace.chain
-                )
-        subject = self._names.subject(record.kind, record.step, record.link)
-        return DecisionView(
-            record.seq, t_us, t_us, 1, subject, record.outcome, record.reason,
-            _meaning(record.reason), clause, place, record.target or "", reads, passing, chain,
+        view = DecisionView(
+            record.seq, t_us, t_us, 1, self._names.subject(record.kind, record.step, record.link), record.outcome,
+            record.reason, _meaning(record.reason), clause, place, record.target or "", (), (), (),
             self._approvals(record), None,
         )  # fmt: skip
+        if self._explained >= MOST_EXPLAINED:
+            self.unexplained += 1
+            return view
+        self._explained += 1
+        found = explained(record, self._subject)
+        if isinstance(found, StepExplained):
+            return self._of_step(view, record, found)
+        return self._of_link(view, record, found) if isinstance(found, LinkExplained) else view
+
+    def _of_step(self, view: DecisionView, record: DecisionRecord, found: StepExplained) -> DecisionView:
+        trace, flat = found.trace, found.invocation.invocation
+        decisive = trace.decision.clause
+        checked: list[Decisive] = [each.clause for step in trace.steps for each in step.checks]
+        view = view._replace(
+            clause=words.quoted(self._policy, flat, decisive) or view.clause,
+            reads=self._reads(record, [decisive] if decisive is not None else checked, flat.contract, flat.arguments),
+            would_pass=tuple(map(words.would_pass, trace.nearest)),
+        )
+        permit = _permit(found)
+        return view if permit is None else self._because(view, record, permit)
+
+    def _of_link(self, view: DecisionView, record: DecisionRecord, found: LinkExplained) -> DecisionView:
+        """A decision on a link: the `degrade` rule whose target it is, or else what its skill requires."""
+        trace, link = found.trace, found.trace.link.link
+        view = view._replace(
+            flies=words.link(self._policy, link),
+            chain=tuple(f"{each.text}: {'may fly' if each.admissible else 'may not'}" for each in trace.chain),
+        )
+        if trace.rule is not None and found.of is not None:
+            flat = found.of.invocation
+            reads = self._reads(record, [trace.rule], flat.contract, flat.arguments)
+            return self._because(view._replace(reads=reads), record, trace.rule)
+        required = [each.clause for each in trace.checks]
+        return view._replace(reads=self._reads(record, required, self._policy.contracts[link.skill], link.arguments))
+
+    def _because(self, view: DecisionView, record: DecisionRecord, rule: Rule) -> DecisionView:
+        return view._replace(clause=_quoted(rule.text), place=self._place(record.step, rule.source, rule.start))
 
     @property
     def _policy(self) -> Policy:
         return self._subject.policy.policy
 
-    def _reads(self, record: DecisionRecord, found: StepExplained) -> tuple[ReadSignal, ...]:
-        """The values that the deciding clause read; of an `allow`, those of all conditions that were checked."""
-        flat, state = found.invocation.invocation, state_of(record)
-        decisive = found.trace.decision.clause
-        checked: list[Decisive] = [each.clause for step in found.trace.steps for each in step.checks]
+    def _reads(
+        self, record: DecisionRecord, clauses: Iterable[Decisive], contract: Contract, arguments: tuple[int, ...]
+    ) -> tuple[ReadSignal, ...]:
+        """The signals and arguments that clauses read, with their values in the record."""
+        state = state_of(record)
         told: dict[str, ReadSignal] = {}
-        for clause in [decisive] if decisive is not None else checked:
-            for read in read_values(clause, self._policy, flat.contract, flat.arguments, state):
-                age = None
+        for clause in clauses:
+            for read in read_values(clause, self._policy, contract, arguments, state):
                 if read.signal is not None:
                     age = max(state.ages[slot] for slot in read.signal.slots)
-                told.setdefault(read.name, ReadSignal(read.name, self._value(found, read), age))
+                    told.setdefault(read.name, ReadSignal(read.name, words.read_value(self._policy, read), age))
+                else:
+                    parameter = next(each for each in contract.parameters if each.name == read.name)
+                    value = argument(self._policy, parameter, arguments)
+                    told.setdefault(read.name, ReadSignal(read.name, value, None))
         return tuple(told.values())[:_MOST_READ]
-
-    def _value(self, found: StepExplained, read: ReadValue) -> str:
-        if read.signal is not None:
-            return words.read_value(self._policy, read)
-        flat = found.invocation.invocation
-        parameter = next(each for each in flat.contract.parameters if each.name == read.name)
-        return argument(self._policy, parameter, flat.arguments)
 
     def _approvals(self, record: DecisionRecord) -> tuple[str, ...]:
         people: People = self._names.people
@@ -154,6 +165,10 @@ def _permit(found: StepExplained) -> Rule | None:
     checks = (check for step in found.trace.steps for check in step.checks)
     return next((each.clause for each in checks
                  if each.role == "permit" and each.truth == TRUE and isinstance(each.clause, Rule)), None)  # fmt: skip
+
+
+def _quoted(text: str) -> str:
+    return f"`{' '.join(text.split())}`"
 
 
 def _meaning(reason: str) -> str:

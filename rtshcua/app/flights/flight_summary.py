@@ -5,6 +5,7 @@ what nothing vouches for.
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from rtshcua.app.documents import Claimed
 from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.telling import words
 from rtshcua.app.wording import many
@@ -99,9 +100,16 @@ class FlightSummary:
         after = f" The steps are those after {many(newer, 'replacement')}." if newer else ""
         return f"Mission `{first.name}`{intent}{by} {' and '.join(whose)}: {many(len(steps), 'step')}, {told}.{after}"
 
+    def _signers(self) -> str:
+        """The keys of policy and mission, and whose these are."""
+        bundle, people = self._collected.records.bundle, self._names.people
+        if not isinstance(bundle, Claimed) or not self._details:
+            return ""
+        return f", signed by {people.signer(bundle.policy_kid)}; the mission by {people.signer(bundle.mission_kid)}"
+
     def _allowed(self) -> str:
         policy = self._flight.policy
-        told = f"The signed policy `{policy.name}`, version {policy.version}"
+        told = f"The policy `{policy.name}`, version {policy.version}{self._signers()}"
         if self._flight.genesis.mode == "none":
             return f"Nobody had to: in mode `none` nothing is enforced. {told} was only compared with what flew."
         answers = list(self._effects("approval"))

@@ -101,7 +101,9 @@ class _Events:
 
     def _ran(self, record: Effect, from_us: int, to_us: int, how: str) -> TimelineEvent:
         step = record.kind == STEP
-        told = f"{self._names.subject(record.kind, record.step, record.link)}: {how}"
+        subject = self._names.subject(record.kind, record.step, record.link)
+        flies = "" if self._names.text(record.kind, record.step, record.link) else self._names.detail(record)
+        told = f"{subject}{f', `{flies}`' if flies else ''}: {how}"
         return TimelineEvent(
             "dispatched" if step else "fallback", from_us, to_us, "step" if step else "link", told, record.seq
         )

@@ -34,7 +34,7 @@ from rtshcua.ground.drawing.time_charts import (
 )
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
 from rtshcua.ground.flight import embedding
-from rtshcua.ground.flight.flight_content import LANES, FlightReport, SignalCurve
+from rtshcua.ground.flight.flight_content import LANES, DecisionView, FlightReport, SignalCurve
 from rtshcua.ground.flight.track import parts
 from rtshcua.ground.flight.units import unit_of
 from rtshcua.model.flat.zone import SHIFT, Projection
@@ -135,10 +135,10 @@ def _flown(report: FlightReport) -> FlownWay | None:
     for point, (x, y) in zip(track.points, places, strict=True):
         ground = None if point.above_ground is None else point.above_home - point.above_ground
         flown.append(FlownPlace(point.t_us, x, y, point.above_home, ground))
-    first = sorted(report.decisions, key=lambda each: each.outcome == "allow")[:_MOST_MARKS]
+    first = sorted(report.decisions, key=_goes_on)[:_MOST_MARKS]
     marks = tuple(
-        FlightMark(each.t_us, *(each.where or (0, 0)), f"{each.seq}: {each.outcome}",
-                   "event" if each.outcome == "allow" else "refused")
+        FlightMark(each.t_us, *(each.where or (0, 0)), f"{each.seq}: {_marked(each)}",
+                   "event" if _goes_on(each) else "refused")
         for each in sorted(first, key=lambda each: each.t_us)
         if each.where is not None or not track.places
     )  # fmt: skip
@@ -216,6 +216,15 @@ def _data(report: FlightReport, axis: TimeAxis, plan: ZoneMap | None) -> Markup:
     if plan is not None:
         data["map"] = {"scale": 10 * plan.on.scale, "x0": plan.on.x0, "y0": plan.on.y0, **_plane(report.projection)}
     return safe_json(data)
+
+
+def _goes_on(decision: DecisionView) -> bool:
+    """Whether a decision lets a step fly, not a fallback."""
+    return decision.outcome == "allow" and not decision.flies
+
+
+def _marked(decision: DecisionView) -> str:
+    return decision.flies.partition("(")[0] if decision.outcome == "allow" and decision.flies else decision.outcome
 
 
 def _plane(projection: Projection | None) -> dict[str, float]:

@@ -59,6 +59,22 @@ def test_flight_that_turned_home_says_why(turned: Path) -> None:
     assert stopped[-1].until_us <= flown[0].t_us
 
 
+def test_decision_on_the_fallback_tells_its_rule_and_what_it_read(turned: Path) -> None:
+    report = report_of(turned).report
+    rule = next(each for each in report.decisions if each.subject.startswith("target of the degrade rule"))
+    assert (rule.outcome, rule.flies) == ("allow", "return_home()")
+    assert rule.clause == "`degrade ()`"  # its text in this policy, which is made by hand
+    assert rule.place
+    (battery,) = (each for each in rule.reads if each.name == "battery")
+    assert battery.value.endswith("%")
+    assert battery.age_us is not None
+    assert rule.would_pass == ()
+    assert rule.chain
+    flown = [each.told for each in report.timeline if each.lane == "fallback" and each.until_us is not None]
+    assert "`return_home`" in flown[0]
+    assert f"{rule.seq}: return_home" in page(report)
+
+
 def test_events_and_decisions_are_those_of_the_log(completed: Path) -> None:
     report = report_of(completed).report
     lines = [json.loads(line) for line in (completed / "log.jsonl").read_bytes().splitlines()]

@@ -31,7 +31,7 @@ class Sink(EvidenceFile):
 
     kept = synced = 0
 
-    def append(self, line: bytes, durability: int) -> int:  # type: ignore[override]
+    def append(self, line: bytes, durability: int) -> int:  # type: ignore[override]  # as an `EvidenceSink` returns it
         """Write one line, without a sync."""
         super().append(line, WRITTEN)
         self.kept = self.synced = self.kept + 1

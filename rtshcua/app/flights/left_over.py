@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from html.parser import HTMLParser
+from importlib.abc import InspectLoader
 from importlib.resources import files
 from importlib.util import find_spec
 from types import CodeType
@@ -67,7 +68,7 @@ def ordinary_words() -> frozenset[str]:
                 found |= words_of(each.read_text(encoding="utf-8"))
     for name in _TELLING:
         spec = find_spec(name)
-        code = None if spec is None else spec.loader.get_code(name)  # type: ignore[union-attr]
+        code = spec.loader.get_code(name) if spec is not None and isinstance(spec.loader, InspectLoader) else None
         for text in () if code is None else _constants(code):
             found |= words_of(text)
     return frozenset(found)

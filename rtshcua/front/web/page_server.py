@@ -12,7 +12,7 @@ from contextlib import suppress
 from hashlib import sha256
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 _HOST: Final = "127.0.0.1"
 #: how long a client may take over its whole request, s
@@ -68,13 +68,13 @@ class _Server(ThreadingHTTPServer):
         super().__init__(address, handler)
         self.free = threading.BoundedSemaphore(_MOST_CLIENTS)
 
-    def process_request(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
+    def process_request(self, request: Any, client_address: Any) -> None:
         if not self.free.acquire(blocking=False):
             self.shutdown_request(request)
             return
         super().process_request(request, client_address)
 
-    def process_request_thread(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
         late = threading.Timer(_PATIENCE_S, _ended, (request,))
         late.daemon = True
         late.start()

@@ -1,7 +1,7 @@
 """The groups in which `--help` shows the options of commands with many options."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 #: by command: the title of each group and its options in order; other options come first, under `Options`
 OPTION_GROUPS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
@@ -93,7 +93,7 @@ def grouped(command: object, name: str) -> None:
         return
     order = {option: number for number, option in enumerate(option for group in groups.values() for option in group)}
     title = {option: title for title, options in groups.items() for option in options}
-    parameters = command.params  # type: ignore[attr-defined]
+    parameters: list[Any] = getattr(command, "params", [])
     for parameter in parameters:
         found = next((option for option in getattr(parameter, "opts", ()) if option in title), None)
         if found is not None:

@@ -23,10 +23,9 @@ _SECONDS, _OCTETS_A_SECOND = 20, 1 << 20
 def main(kind: str, descriptor: int) -> None:
     """Read the log and report it."""
     size = os.fstat(0).st_size
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY + size, _MEMORY + size))
-    seconds = _SECONDS + size // _OCTETS_A_SECOND
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    _limit(resource.RLIMIT_AS, _MEMORY + size)
+    _limit(resource.RLIMIT_CPU, _SECONDS + size // _OCTETS_A_SECOND)
+    _limit(resource.RLIMIT_CORE, 0)
     os.environ.pop("PYMAVLINK_FAST_INDEX", None)  # the slow index of pymavlink never ends if a length is 0
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
@@ -37,6 +36,13 @@ def main(kind: str, descriptor: int) -> None:
             file.write(msgspec.json.encode(what) + b"\n")
 
     report(_read(kind, size, lambda octets: report(ReadSoFar(octets))))
+
+
+def _limit(what: int, most: int) -> None:
+    """Limit this process, which may already be limited to less."""
+    hard = resource.getrlimit(what)[1]
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(what, (most, most))
 
 
 def _read(kind: str, size: int, progress: Callable[[int], None]) -> ReadLog | ReadFailed:

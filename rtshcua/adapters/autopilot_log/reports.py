@@ -2,7 +2,7 @@
 
 import msgspec
 
-#: the fields of a PX4 log or the types of an ArduPilot log that could have the track
+# why a log cannot be read
 NO_TRACK = "no-track"
 NO_LIBRARY = "no-library"
 UNREADABLE = "unreadable"

@@ -336,7 +336,7 @@ class GatewayService:
             return Refusal("relay", text, "its own failsafe acts; start the gateway again", ExitCode.FAULT)
         self._console.tell({"event": "note", "text": "the relay ended, and is started again"})
         for client in [*self._clients]:
-            self._take(interface.ClientDown(client), now)
+            self._take(interface.ClientDown(client, relay_ended=True), now)
         self._clients.clear()
         if self._session is not None:
             self._session.process.kill()

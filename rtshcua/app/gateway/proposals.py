@@ -115,8 +115,6 @@ class Proposals:
 
     def add(self, proposal: Propose) -> list[Event]:
         """Add a proposal; the refusal if there are too many."""
-        if not proposal.fly:  # a mission that the same client uploads again replaces the one before
-            self._waiting = [each for each in self._waiting if each.fly or each.client != proposal.client]
         safe = self._is_safe(proposal)
         if len(self._waiting) >= _MOST_WAITING * (2 if safe else 1):
             text = "too many commands at once; send them one after the other"

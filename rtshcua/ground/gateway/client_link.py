@@ -15,10 +15,11 @@ TEXT_EVERY_US: Final = 5_000_000
 #: the most chunks of one text
 _MOST_CHUNKS: Final = 4
 _MOST_KEYS: Final = 64
-#: a `client` record: its most octets, and the most characters of a text in it and of the client's name
+#: a `client` record: its most octets, and the most characters of a text in it
 LONGEST_RECORD: Final = 200
 _LONGEST_TEXT: Final = 80
-_LONGEST_NAME: Final = 40
+#: what a client can cause as often as it likes; everything else is recorded at any rate
+_OFTEN: Final = frozenset({"refused", "absorbed", "passed"})
 #: how many records at once, and the interval after that, us
 _RECORDS: Final = 20
 _RECORD_EVERY_US: Final = 200_000
@@ -124,12 +125,12 @@ class ClientLink:
         """Record what happened to a frame of the client: `refused`, `absorbed`, `passed`, `accepted`. Beyond a rate,
         records are counted, and the count is in the next one.
         """
-        full = len(self._recorded) == _RECORDS
+        full = len(self._recorded) == _RECORDS and effect in _OFTEN
         if full and now_us - self._recorded[0] < _RECORDS * _RECORD_EVERY_US:
             self._left_out += 1
             return
         self._recorded.append(now_us)
-        said: dict[str, Any] = {"client": self.name[:_LONGEST_NAME], "effect": effect}
+        said: dict[str, Any] = {"client": self.name, "effect": effect}
         if self._left_out:
             said["left_out"] = self._left_out
             self._left_out = 0

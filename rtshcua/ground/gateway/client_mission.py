@@ -8,7 +8,7 @@ from rtshcua.ground.gateway.accepted import ITEM
 from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.client_proposal import AskedBy, ClientProposal
 from rtshcua.ground.gateway.gateway_state import ConnectedClient, GatewayState
-from rtshcua.ground.gateway.interface import ProposalChecked, ProposedStep
+from rtshcua.ground.gateway.interface import ProposalChecked, ProposedStep, Withdraw
 from rtshcua.ground.gateway.plan_transfer import MISSION_DENIED, PlanTransfer, RefusedPlan, UploadedPlan, read_plan
 from rtshcua.ground.gateway.proposing import Proposing
 from rtshcua.mavlink import enums, layouts
@@ -41,16 +41,18 @@ class ClientMissions:
             client.transfer.translation = self._state.translation
         for client in dict.fromkeys(self._uploads.values()):
             client.transfer.checked("the policy was renewed: upload it again", now_us)
-        self._uploads.clear()
+            self.forget(client)
         autopilot = self._state.settings.autopilot
         for name, plan in list(self._state.plans.items()):
             source = self._state.sources[name]
             read = read_plan(plan.items, self._state.translation, source.shadows, now_us, autopilot)
-            if isinstance(read, RefusedPlan):
+            if isinstance(read, RefusedPlan) and not read.for_now:
                 self._withdraw(name, read.text, now_us)
                 continue
-            self._state.plans[name] = read
             self._unchecked.add(name)
+            if isinstance(read, RefusedPlan):
+                continue  # its former steps stay, and are decided by the policy that is in force then
+            self._state.plans[name] = read
             mission = source.mission
             source.mission = (mission[0], read) if mission is not None and mission[1] is plan else None
 
@@ -59,7 +61,9 @@ class ClientMissions:
         for name in sorted(self._unchecked & self._state.plans.keys()):
             plan = self._state.plans[name]
             client = next((each.link.client for each in self._state.of(name)), 0)
-            self._rechecks = {at: each for at, each in self._rechecks.items() if each[0] != name}
+            for number in [at for at, each in self._rechecks.items() if each[0] == name]:
+                del self._rechecks[number]
+                self._state.actions.append(Withdraw(number))
             self._rechecks[self._check(client, self._state.sources[name].role, plan)] = name, plan
         self._unchecked.clear()
 
@@ -83,8 +87,10 @@ class ClientMissions:
         return plan is not None
 
     def forget(self, client: ConnectedClient) -> None:
-        """A connection is gone, and its upload."""
-        self._uploads = {at: each for at, each in self._uploads.items() if each is not client}
+        """A connection is gone, or uploads again: its upload is not checked any more."""
+        for number in [at for at, each in self._uploads.items() if each is client]:
+            del self._uploads[number]
+            self._state.actions.append(Withdraw(number))
 
     def _withdraw(self, name: str, why: str, now_us: int) -> None:
         """Forget a mission that the policy does not permit any more, and tell its client once it is there."""
@@ -159,7 +165,7 @@ class ClientMissions:
         return result
 
     def jump(self, client: ConnectedClient, item: float, now_us: int) -> int:
-        """DOenums.MAV_CMD_DO_SET_MISSION_CURRENT, MISSION_SET_CURRENT: only back to the beginning, before the start."""
+        """DO_SET_MISSION_CURRENT, MISSION_SET_CURRENT: only back to the beginning, before the start."""
         if self._flies(client):
             client.reject("the mission flies: stop it first", enums.MAV_CMD_DO_SET_MISSION_CURRENT, now_us)
             return TEMPORARILY_REJECTED

@@ -6,8 +6,9 @@ returns or lands, and the step that flies is none that stands later there: nobod
 it is rejected. The policy decides on every step besides.
 
 A pilot who requests control keeps all clients out. It belongs to one sender at one station, until that sender releases
-it, another pilot requests it, or the station is gone: frames of a radio on the way to it change nothing. Other frames
-of pilots went to the vehicle.
+it, another pilot requests it, or the station is gone: frames of a radio on the way to it change nothing. If the relay
+ends, control stays, until the station is heard again or another pilot takes it. Other frames of pilots went to the
+vehicle.
 """
 
 from typing import Final
@@ -19,6 +20,7 @@ from rtshcua.ground.gateway.gateway_state import ConnectedClient, GatewayState
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.command_results import ACCEPTED, DENIED
 
+_NO_STATION: Final = -1
 #: how long a client keeps control after its last step, us
 KEEPS_US: Final = 10_000_000
 #: what of a pilot's frames is recorded
@@ -37,15 +39,21 @@ class Pilots:
         self._system = system
         self.links: dict[int, ClientLink] = {}  # the stations that are there, by number
         self._holder: tuple[int, int] | None = None  # the station's number, and the system of the sender
+        self._unheard = ""  # the name of the holder's station, if the relay ended since it was heard
 
     @property
     def in_control(self) -> int:
         """The system id of the pilot who keeps all clients out; 0 if nobody does."""
         return 0 if self._holder is None else self._holder[1]
 
-    def leave(self, client: int) -> None:
-        """A station is gone, and with it the control that it had."""
-        if self.links.pop(client, None) is not None and self._holder is not None and self._holder[0] == client:
+    def leave(self, client: int, *, relay_ended: bool = False) -> None:
+        """A station is gone, and with it the control that it had, unless only the relay ended."""
+        link = self.links.pop(client, None)
+        if link is None or self._holder is None or self._holder[0] != client:
+            return
+        if relay_ended:
+            self._holder, self._unheard = (_NO_STATION, self._holder[1]), link.name
+        else:
             self._holder = None
 
     def take(self, client: int, frame: bytes, now_us: int) -> bool:
@@ -54,6 +62,8 @@ class Pilots:
         if link is None or message is None:
             return False
         link.hear(message, now_us)
+        if self._holder == (_NO_STATION, message.system) and link.name == self._unheard:
+            self._holder = client, message.system
         if message.message not in _RECORDED:
             return False
         command = message.fields.get("command")

@@ -1,7 +1,8 @@
 """The interface of the gateway's pure part: what happens (events), and what is to be done (actions).
 
-`Gateway.take(event, now)` of `translator.py` returns actions, in order. It does no I/O and reads no clock. Its caller,
-the service `app/gateway`, passes frames, lines of the flight and results of its worker in, and carries out the actions.
+`Gateway.take(event, now)` of `translator.py` returns actions, in the order in which they arose. It does no I/O, and
+reads no clock. Its caller, the service `app/gateway`, passes frames, lines of the flight and results of its worker in,
+and carries out the actions.
 
 A client is a number, as the relay gives it; all frames are complete MAVLink frames, and those to clients are unsigned.
 """
@@ -37,7 +38,7 @@ REQUESTS = ("parameters", "messages", "rates", "time", "logs")
 
 
 class GatewaySettings(NamedTuple):
-    """What does not change while the gateway runs.
+    """What holds for one policy: `Gateway.renew` takes that of another one.
 
     `policy` is the policy in force, `defaults` each skill's parameters with the default values, in canonical units (a
     parameter without a default is absent). `accepted` are the rows of the table for the vehicle's autopilot.
@@ -66,9 +67,10 @@ class ClientUp(NamedTuple):
 
 
 class ClientDown(NamedTuple):
-    """A client disconnected, or was silent for long."""
+    """A client disconnected, or was silent for long; or the relay ended, and nobody knows whether it is still there."""
 
     client: int
+    relay_ended: bool = False
 
 
 class FromClient(NamedTuple):

@@ -17,7 +17,7 @@ from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.interface import ProposedStep
 from rtshcua.ground.gateway.translation import Translation, Untranslated
 from rtshcua.mavlink import enums, layouts
-from rtshcua.mavlink.command_results import ACCEPTED, UNSUPPORTED
+from rtshcua.mavlink.command_results import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
 from rtshcua.mavlink.modes import ARDUPILOT
 from rtshcua.model.flat.contract import MotionKind
 
@@ -60,10 +60,11 @@ class UploadedPlan(NamedTuple):
 
 
 class RefusedPlan(NamedTuple):
-    """Why a mission cannot be translated: MAV_MISSION_RESULT and the reason."""
+    """Why a mission cannot be translated: MAV_MISSION_RESULT and the reason. `for_now`: it may be translated later."""
 
     result: int
     text: str
+    for_now: bool = False
 
 
 @dataclass(slots=True)
@@ -262,7 +263,7 @@ def read_plan(
             continue
         problem = made.add(number, item)
         if problem is not None:
-            return RefusedPlan(problem.result, f"item {number}: {problem.text}")
+            return problem._replace(text=f"item {number}: {problem.text}")
     if not made.steps:
         return RefusedPlan(MISSION_INVALID, "the mission has no item that flies")
     return UploadedPlan(tuple(items), tuple(made.steps), tuple(made.item_of))
@@ -324,7 +325,7 @@ class _Steps:
         if not isinstance(step, Untranslated) and self._speed is not None:
             step = self._translation.with_speed(step, self._speed)
         if isinstance(step, Untranslated):
-            return RefusedPlan(MISSION_INVALID, step.text)
+            return RefusedPlan(MISSION_INVALID, step.text, for_now=step.result == TEMPORARILY_REJECTED)
         contract = self._translation.contract(step.skill)
         if contract is not None and contract.motion.altitude >= 0:
             self._height = step.values[contract.motion.altitude]

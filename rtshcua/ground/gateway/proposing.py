@@ -31,6 +31,7 @@ _NO_FLIGHT: Final = "no flight is ready yet"
 _LANDS: Final = "the vehicle is still landing"
 #: the most proposals of one client that are neither taken nor refused
 MOST_OPEN: Final = 4
+_TOO_MANY_WAIT: Final = f"too many commands wait: at most {MOST_OPEN} at once"
 _TOO_MANY: Final = f"too many commands: at most {MOST_DECISIONS} a second are decided"
 #: the flight's answers to a document that a later one may not get
 _FOR_NOW: Final = frozenset({"busy", "already-released", "superseded", "not-flying", "falling-back"})
@@ -94,6 +95,8 @@ class Proposing:
         if refusal is not None:
             return self._refuse(client, refusal, message, command, now_us)
         if waiting >= MOST_OPEN:
+            client.link.text(_TOO_MANY_WAIT, now_us, _TOO_MANY_WAIT)
+            client.link.record("refused", now_us, skill=steps[0].skill, reason=_TOO_MANY_WAIT)
             return TEMPORARILY_REJECTED
         self._add(client, steps, asked, now_us)
         return None
@@ -139,7 +142,7 @@ class Proposing:
         if command < 0 or not self.holds or message.message in _ITEMS:
             return False
         own = [each for each in self._held if each.client is client]
-        same = next((each for each in own if each.command == command), None)
+        same = next((each for each in own if (each.command, each.message.sender) == (command, message.sender)), None)
         if same is not None:  # sent again, or changed: the last one counts, and waits no longer for it
             same.message, same.told_us = message, now_us
         elif len(own) < MOST_OPEN:

@@ -79,8 +79,8 @@ class Gateway:
                 self._tick(now)
             case interface.ClientUp(client, of):
                 self._up(ClientLink(client, of, self._state.settings.system, self._state.actions, now_us), now_us)
-            case interface.ClientDown(client):
-                self._down(client, now_us)
+            case interface.ClientDown(client, relay_ended):
+                self._down(client, now_us, relay_ended=relay_ended)
             case interface.RequestAnswered(number, slug):
                 self._state.requests.answered(number, slug, now_us)
             case interface.ProposalChecked():
@@ -99,8 +99,6 @@ class Gateway:
 
     def _up(self, link: ClientLink, now_us: int) -> None:
         """A client is there: it goes on with what its former connection left."""
-        # an earlier gateway may have withheld something
-        self._state.actions.append(interface.Withhold(link.client, frozenset()))
         if link.settings.pilot:
             self._control.pilots.links[link.client] = link
         if link.settings.pilot or len(self._state.clients) >= _MOST_CLIENTS:
@@ -366,8 +364,8 @@ class Gateway:
         self._proposing.end_without_client(now_us)
         self._proposing.tidy(now_us)
 
-    def _down(self, number: int, now_us: int) -> None:
-        self._control.pilots.leave(number)
+    def _down(self, number: int, now_us: int, *, relay_ended: bool) -> None:
+        self._control.pilots.leave(number, relay_ended=relay_ended)
         client = self._state.clients.pop(number, None)
         if client is None:
             return

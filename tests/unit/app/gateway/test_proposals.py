@@ -230,6 +230,16 @@ def test_an_uploaded_mission_is_checked_and_not_signed(proposals: Proposals) -> 
     assert not proposals.busy
 
 
+def test_missions_of_absent_clients_are_all_checked(proposals: Proposals) -> None:
+    """They have the same number, 0."""
+    for number in range(3):
+        assert proposals.add(propose(number, TAKEOFF, fly=False)._replace(client=0)) == []
+    events: list[Event] = []
+    while proposals.busy:
+        events += signed(proposals, moment())[0]
+    assert events == [ProposalChecked(number, None) for number in range(3)]
+
+
 def test_too_many_proposals_and_the_end_of_a_flight(proposals: Proposals) -> None:
     refused = [each for number in range(40) for each in proposals.add(propose(number, TAKEOFF))]
     assert len(refused) == 40 - 16

@@ -967,3 +967,34 @@ def test_what_is_kept_of_the_vehicle_is_bounded() -> None:
     assert (len(seen._frames), len(seen.parameters)) == (512, 4_096)
     world.take(FromVehicle(value[:-1] + bytes([value[-1] ^ 1])))
     assert "P" not in seen.parameters, "a damaged frame"
+
+
+def test_pilot_keeps_control_while_only_the_relay_ended() -> None:
+    world = piloted()
+    control(world, 1)
+    world.take(ClientDown(1, relay_ended=True))
+    world.take(ClientDown(9, relay_ended=True))
+    world.client(1, "script")
+    world.client(2, "other tower", pilot=True)
+    world.client(3, "tower", pilot=True)
+    world.ready()
+    assert texts(world.send(TAKEOFF)) == ["takeoff rejected: the pilot is in control"]
+    control(world, 0, station=2)
+    control(world, 0, station=3, system=254)
+    assert controls(world.wait(1_000_000)) == [255], "another station, and another sender of this one"
+    world.send(BEAT, client=3, sender=(255, 190), pilot=True)
+    assert controls(control(world, 0, station=3)) == [0]
+    control(world, 1, station=3)
+    world.take(ClientDown(3))
+    assert controls(world.wait(1_000_000)) == [0], "the station is gone"
+
+
+def test_each_sender_of_a_connection_is_answered_when_the_flight_is_ready() -> None:
+    world = GatewayWorld()
+    for system in (250, 251):
+        world.send(TAKEOFF, sender=(system, 190))
+    world.ready()
+    world.accept(world.wait(200_000))
+    world.dispatch(0)
+    answers = [each for each in told(world.done) if each.get_type() == "COMMAND_ACK"]
+    assert {each.target_system for each in answers if each.result == 0} == {250, 251}

@@ -405,7 +405,7 @@ def test_frames_for_another_system_are_not_answered() -> None:
 
 def test_long_texts_come_in_chunks_and_records_stay_short() -> None:
     world = GatewayWorld()
-    world.client(3, "a" * 90)
+    world.client(3, "a" * 40)  # the longest name
     world.fly()
     actions = world.send(reposition(latitude=473_990_000, longitude=85_700_000), client=3)
     chunks = [message for message in told(actions, 3) if message.get_type() == "STATUSTEXT"]
@@ -449,3 +449,14 @@ def test_records_beyond_the_rate_are_counted() -> None:
     world.now_us += 5_000_000
     (next_one,) = (json.loads(each.text) for each in world.send(command_long(246)) if isinstance(each, ClientNote))
     assert next_one["left_out"] == 80
+
+
+def test_what_flies_is_recorded_at_any_rate() -> None:
+    world = GatewayWorld()
+    world.ready()
+    for at in range(100):
+        world.send(command_long(246, at))
+    world.accept(world.send(command_long(22, 0, 0, 0, 0, 0, 0, 503)))
+    world.dispatch(0)
+    recorded = [json.loads(each.text) for each in world.done if isinstance(each, ClientNote)]
+    assert [each["effect"] for each in recorded if each["effect"] != "refused"] == ["permitted"]

@@ -26,6 +26,7 @@ from rtshcua.ground.gateway.interface import (
     ProposalAnswered,
     ProposalChecked,
     Propose,
+    Withdraw,
     Withhold,
 )
 from rtshcua.ground.gateway.plan_transfer import MOST_ITEMS
@@ -621,3 +622,44 @@ def test_an_upload_and_a_command_that_wait_meet_a_renewed_policy() -> None:
     assert results(renewed(world)) == [(14, 0)]
     world.ready()
     assert [skill for skill, *_ in proposals(world.wait(100_000))] == ["takeoff"]
+
+
+def test_missions_of_absent_clients_are_each_checked_again() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.client(2, "other")
+    for client in (1, 2):
+        stored(world, mission(), client)
+    for client in (1, 2):
+        world.take(ClientDown(client))
+    actions = renewed(world)
+    checks = [each for each in actions if isinstance(each, Propose)]
+    assert [(each.client, each.fly) for each in checks] == [(0, False)] * 2
+    assert not any(isinstance(each, Withdraw) for each in actions)
+    for check in checks:
+        world.take(ProposalChecked(check.number, "the way home is too long"))
+    for client, name in ((3, "script"), (4, "other")):
+        world.client(client, name)
+        assert texts(world.done, client) == ["mission withdrawn, the policy was renewed: the way home is too long"]
+
+
+@pytest.mark.parametrize("gone", [True, False])
+def test_check_of_an_upload_that_nobody_waits_for_is_withdrawn(gone: bool) -> None:
+    world = GatewayWorld()
+    (first,) = (each for each in upload(world, mission()) if isinstance(each, Propose))
+    actions = world.take(ClientDown(1)) if gone else upload(world, mission())
+    assert Withdraw(first.number) in actions
+    assert results(world.take(ProposalChecked(first.number, None))) == []
+
+
+def test_mission_that_cannot_be_read_for_now_stays_under_a_renewed_policy() -> None:
+    """The vehicle restarted, and did not say yet how high its home is."""
+    world = GatewayWorld()
+    world.ready()
+    stored(world, [item(0, WAYPOINT, x=N, y=E, z=503, frame=5)])
+    for boot_ms in (100_000, 0):
+        world.vehicle(mavlink.MAVLink_system_time_message(0, boot_ms))
+    actions = renewed(world)
+    assert texts(actions) == []
+    (check,) = (each for each in actions if isinstance(each, Propose))
+    assert not check.fly

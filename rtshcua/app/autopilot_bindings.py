@@ -11,7 +11,7 @@ from rtshcua.adapters.store.reading import open_regular, read_regular
 from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.evidence.report import LogReport
-from rtshcua.ground.flight.agreement import AGREES_MM, AGREES_US, TrackAgreement, TrackDeviation
+from rtshcua.ground.flight.agreement import AGREES_MM, AGREES_US
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.wire import cose
 from rtshcua.wire.autopilot_binding import (
@@ -58,18 +58,6 @@ def _found(paths: Sequence[Path]) -> Iterator[FoundBinding]:
                 yield FoundBinding(path, document, content)
             except Untrusted as error:
                 yield FoundBinding(path, document, error)
-
-
-def agreement_of(binding: AutopilotBinding) -> TrackAgreement:
-    """The agreement that a binding states; of many deviations only the largest."""
-    deviations = (
-        TrackDeviation(each.from_us, each.to_us, each.points, each.horizontal, each.vertical)
-        for each in binding.deviations
-    )
-    return TrackAgreement(
-        binding.points, binding.compared, binding.agreed, binding.horizontal, binding.vertical, tuple(deviations),
-        binding.flown_us, binding.covered_us,
-    )  # fmt: skip
 
 
 def genesis_leaf(log: Path) -> bytes:

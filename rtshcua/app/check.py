@@ -150,6 +150,8 @@ def _unfit(request: CheckRequest, files: Sequence[Path]) -> Refusal | None:
     unfit = None if request.map is None else unfit_place(request.map, files, "a page")
     if unfit is not None or request.picture is None:
         return unfit
+    if request.map is not None and request.map.resolve() == request.picture.resolve():
+        return Refusal("output", f"`{request.picture}` cannot be both the map and the picture", "name two files")
     return unfit_picture(request.picture, files, as_json=request.as_json)
 
 

@@ -43,3 +43,8 @@ def many(count: int, what: str) -> str:
 def shorten(text: str, width: int) -> str:
     """Cut a text to `width` characters, with an ellipsis if it was longer."""
     return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def seconds(us: int) -> str:
+    """A time in seconds, to a tenth."""
+    return f"{us / 1_000_000:.1f} s"

@@ -25,7 +25,6 @@ from rtshcua.ground.flight.agreement import TrackAgreement, TrackDeviation, agre
 from rtshcua.ground.flight.boot_clock import BootClock, boot_times
 from rtshcua.wire.autopilot_binding import (
     MAX_DEVIATIONS,
-    MAX_NAME,
     AutopilotBinding,
     BoundDeviation,
     sign_autopilot_binding,
@@ -67,6 +66,8 @@ def bind(request: BindRequest, progress: Callable[[int, int], None] = lambda _do
         text = f"`{log}` fails verification at record {report.failure.record}: {report.failure.text}"
         help = "run `rtshcua verify-log` for details"
         return Refusal(report.failure.slug, text, help, finding_code(report.failure.slug))
+    if not request.file.name.isprintable():  # nor one that is not UTF-8
+        return Refusal("input", f"the name of `{request.file}` has characters that cannot be shown", "rename the file")
     read = read_autopilot_log(request.file, progress)
     if isinstance(read, Refusal):
         return read
@@ -113,7 +114,7 @@ def _binding(
         records=report.records,
         root=report.root,
         closed=report.close is not None,
-        file=request.file.name[:MAX_NAME],
+        file=request.file.name,
         digest=read.digest,
         size=read.size,
         kind=read.log.kind.value,

@@ -9,12 +9,12 @@ from typing import Final
 
 from rtshcua import library
 from rtshcua.adapters.store.reading import read_regular
+from rtshcua.ground.language.paths import LIBRARY
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 
 #: a larger file is no source
 _MOST: Final = 1 << 20
-_LIBRARY: Final = "lib:"
 
 
 class ClausePlaces:
@@ -50,8 +50,8 @@ def _sources(names: Sequence[str], digests: Sequence[bytes], folders: Sequence[P
 
 
 def _text(name: str, digest: bytes, folders: Sequence[Path]) -> str | None:
-    if name.startswith(_LIBRARY):
-        places = [library.root() / name.removeprefix(_LIBRARY)]
+    if name.startswith(LIBRARY):
+        places = [library.root() / name.removeprefix(LIBRARY)]
     else:
         places = [folder / part for folder in folders for part in (name, Path(name).name)]
     for place in places:

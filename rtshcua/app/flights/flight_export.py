@@ -13,7 +13,6 @@ from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.flights.telemetry_told import doubts
 from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of
 from rtshcua.app.pin import trusted
-from rtshcua.app.sidecar_files import run_folder
 from rtshcua.app.telling.records_told import Names
 from rtshcua.app.verify_log import VerifyRequest, verify_log
 from rtshcua.app.wording import many
@@ -133,9 +132,9 @@ def _unwritable(target: Path | None, log: Path, format: str) -> Refusal | None:
         return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
     if not target.is_file():
         return None
-    kind, folder = kind_of(target), run_folder(log)
-    if folder is not None and target.resolve().parent == folder.resolve():
-        return Refusal("output", f"`{target}` is a file of the run, and is not overwritten", "write it elsewhere")
+    kind = kind_of(target)
+    if (target.resolve().parent / LOG).exists():
+        return Refusal("output", f"`{target}` is a file of a run, and is not overwritten", "write it elsewhere")
     if kind in _EVIDENCE or target.samefile(log):
         name = "the log" if kind is None else kind.name
         return Refusal("output", f"`{target}` is {name}, and is not overwritten by an export", "name another file")

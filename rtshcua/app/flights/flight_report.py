@@ -100,12 +100,11 @@ class LiveFlight:
 
     def update(self) -> bool:
         """Read what is new; return whether there was anything. Raises OSError."""
-        before = self._offset
+        before, self._collected.flaw = (self._offset, self._collected.flaw), ""
         with open_regular(self._log) as file:
             if os.fstat(file.fileno()).st_size < self._offset:
-                flaw, found = self._collected.flaw, f"the log became shorter than its first {self._records} records"
-                self._collected.flaw = found
-                return flaw != found
+                self._collected.flaw = f"the log became shorter than its first {self._records} records"
+                return before != (self._offset, self._collected.flaw)
             file.seek(self._offset)
             for line in lines(file):
                 if not line.endswith(b"\n"):
@@ -118,7 +117,7 @@ class LiveFlight:
                 self._collected.take(record)
                 self._offset += len(line)
                 self.closed = isinstance(record, Close)
-        return self._collected.update_telemetry() or self._offset > before
+        return self._collected.update_telemetry() or (self._offset, self._collected.flaw) != before
 
     def report(self, made_at_us: int) -> FlightReport | Refusal:
         """The content of the page so far."""

@@ -8,7 +8,7 @@ from typing import Final
 from rtshcua.app.documents import Claimed
 from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.telling import words
-from rtshcua.app.wording import many
+from rtshcua.app.wording import many, seconds
 from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect
 from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.ground.flight.flight_content import SummaryLine, TrackView
@@ -161,11 +161,11 @@ class FlightSummary:
             told += self._stopped()
         if cause is not None:
             record = flight.records[cause.seq]
-            told += f" At {_seconds(flight.since_begun(record))} {self._cause(record)}"
+            told += f" At {seconds(flight.since_begun(record))} {self._cause(record)}"
         after = [each for each in self._effects("dispatched") if cause is not None and each.seq > cause.seq]
         flown = [self._link(each) for each in after if each.kind != STEP]
         if flown:
-            told += f" Then flew, from {_seconds(flight.since_begun(after[0]))} on: {_listed(flown, ', then ')}."
+            told += f" Then flew, from {seconds(flight.since_begun(after[0]))} on: {_listed(flown, ', then ')}."
         return told + self._came_down()
 
     def _link(self, record: Effect) -> str:
@@ -177,7 +177,7 @@ class FlightSummary:
         """Whether the vehicle was seen to land at the end."""
         told, motion = "", None
         for each in self._effects("dispatched", "succeeded", "landed", *_ALOFT):
-            when = _seconds(self._flight.since_begun(each))
+            when = seconds(self._flight.since_begun(each))
             if each.event == "dispatched":
                 told, motion = "", self._names.motion(each)
             elif each.event in _ALOFT:
@@ -228,7 +228,9 @@ class FlightSummary:
     def _intact(self) -> str:
         report = self._report
         if report is None:
-            return "Not verified yet: the log is still being written."
+            if self._ending == "flying":
+                return "Not verified yet: the log is still being written."
+            return "Not verified yet: the log is closed, but nobody verified it."
         if report.failure is not None:
             return f"No: record {report.failure.record} fails ({report.failure.slug}): {report.failure.text}."
         if report.verdict is LogVerdict.INCOMPLETE:
@@ -239,7 +241,7 @@ class FlightSummary:
 
     def _unvouched(self) -> str:
         if self._report is None:
-            return "Anything on this page: it shows what is being recorded, before anybody verified it."
+            return "Anything on this page: nobody verified what it shows."
         told = [claim.text for claim in self._report.unproven]
         if not told:
             return "Nothing is left open."
@@ -259,7 +261,3 @@ _ASKS: Final = frozenset({Reason.AWAITING_APPROVAL.value, Reason.APPROVAL_TIMED_
 def _listed(texts: Sequence[str], between: str) -> str:
     more = f" and {len(texts) - _NAMED} more" if len(texts) > _NAMED else ""
     return between.join(texts[:_NAMED]) + more
-
-
-def _seconds(us: int) -> str:
-    return f"{us / 1_000_000:.1f} s"

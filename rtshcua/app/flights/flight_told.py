@@ -12,7 +12,7 @@ from rtshcua.app.flights.flight_timeline import timeline
 from rtshcua.app.flights.signal_limits import signal_limits
 from rtshcua.app.flights.telemetry_told import doubts, silences
 from rtshcua.app.fly.simulated_flight import SIMULATED
-from rtshcua.app.wording import many, true_to, utc
+from rtshcua.app.wording import many, seconds, true_to, utc
 from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.records import Close, Effect
 from rtshcua.evidence.report import LogReport
@@ -56,7 +56,7 @@ def flight_told(
         steps=len(flight.mission.invocations),
         highest=None if track is None else max(each.above_home for each in track.points),
         distance=None if track is None else distance(track.points, track.places),
-        verdict="growing" if report is None else report.verdict.value,
+        verdict=report.verdict.value if report is not None else "growing" if ending == "flying" else "unverified",
         pinned=pinned,
         origin=origin_of(genesis.vehicle, genesis.boot),
         root="" if report is None else report.root.hex(),
@@ -116,7 +116,7 @@ def _gaps_of_log(flight: Flight, report: LogReport | None) -> Iterator[GapView]:
     if tail:
         yield GapView("witnesses", f"{many(tail, 'record')} at the end, which no witness holds")
     for gap in report.gaps:
-        yield GapView("records", f"nothing was recorded for {_seconds(gap.us)} before record {gap.record}")
+        yield GapView("records", f"nothing was recorded for {seconds(gap.us)} before record {gap.record}")
 
 
 def _gaps_of_telemetry(flight: Flight) -> Iterator[GapView]:
@@ -133,7 +133,3 @@ def _gaps_of_telemetry(flight: Flight) -> Iterator[GapView]:
     if silent:
         named = ", ".join(f"`{name}`" for name in silent)
         yield GapView("signals", f"never known in the telemetry: {named}")
-
-
-def _seconds(us: int) -> str:
-    return f"{us / 1_000_000:.1f} s"

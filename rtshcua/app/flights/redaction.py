@@ -29,6 +29,7 @@ from rtshcua.evidence.report import LogReport
 from rtshcua.ground.flight.field_kinds import KINDS, FieldKind, fields_of
 from rtshcua.ground.flight.flight_content import DecisionView, FlightReport, ListedRecord, ReadSignal, SignalCurve
 from rtshcua.ground.flight.flown import Flight
+from rtshcua.ground.language.paths import LIBRARY
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.signal import Signal
@@ -325,7 +326,7 @@ def _names(flight: Flight, missions: Sequence[Mission], persons: Iterable[str]) 
     phases = dict.fromkeys((*policy.phases, *(phase for each in missions for phase in each.phases)))
     names += [(each, f"phase {number}") for number, each in enumerate(phases, 1)]
     sources = dict.fromkeys((*policy.sources, *(source for each in missions for source in each.sources)))
-    names += [(each, f"source {number}") for number, each in enumerate(sources, 1) if not each.startswith("lib:")]
+    names += [(each, f"source {number}") for number, each in enumerate(sources, 1) if not each.startswith(LIBRARY)]
     names += [(each.name, f"zone {number}") for number, each in enumerate(policy.zones, 1)]
     names += [(each, f"person {number}") for number, each in enumerate(dict.fromkeys(persons), 1)]
     names += [(each.proposer, "a proposer") for each in missions]

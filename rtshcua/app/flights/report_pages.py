@@ -125,8 +125,10 @@ def _name(log: Path, number: int, *, redacted: bool) -> str:
 
 def _written(found: ReportedFlight, file: Path | None, tiles: str) -> FlightPage | Refusal:
     gc.freeze()  # what is there stays until the end: looking through it again and again takes a third of the time
-    text = page(found.report, tiles=tiles)
-    gc.unfreeze()
+    try:
+        text = page(found.report, tiles=tiles)
+    finally:
+        gc.unfreeze()
     left = None if found.redaction is None else found.redaction.left(text)
     if left is not None:
         return left

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from rtshcua.app.wording import many
+from rtshcua.app.wording import many, seconds
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.flight.flown import FlightTelemetry
 
@@ -18,7 +18,7 @@ def doubts(telemetry: FlightTelemetry) -> Iterator[str]:
         yield f"it has vehicles with the system ids {systems}; which one was commanded is not known, this is `{told}`"
     for step in telemetry.steps[:_MOST]:
         way = "back" if step.by_us < 0 else "forward"
-        yield f"its clock went {way} by {_seconds(abs(step.by_us))} after {_seconds(step.after_us)}"
+        yield f"its clock went {way} by {seconds(abs(step.by_us))} after {seconds(step.after_us)}"
     if telemetry.stray:
         yield f"{many(telemetry.stray, 'position')} of an unknown time, which the log does not have, are left out"
 
@@ -27,11 +27,7 @@ def silences(telemetry: FlightTelemetry, lasted_us: int) -> Iterator[str]:
     """Yield the longest silences, in the order of time."""
     longest = sorted(telemetry.silences, key=lambda each: each.from_us - each.to_us)[:_MOST]
     for silence in sorted(longest):
-        to = "the end" if silence.to_us >= lasted_us else _seconds(silence.to_us)
-        yield f"no frame of the autopilot from {_seconds(silence.from_us)} to {to}"
+        to = "the end" if silence.to_us >= lasted_us else seconds(silence.to_us)
+        yield f"no frame of the autopilot from {seconds(silence.from_us)} to {to}"
     if len(telemetry.silences) > _MOST:
         yield f"and {many(len(telemetry.silences) - _MOST, 'shorter silence')}"
-
-
-def _seconds(us: int) -> str:
-    return f"{us / 1_000_000:.1f} s"

@@ -87,4 +87,7 @@ class WatchedPage:
             if not isinstance(found, Refusal):
                 self.verdict = found.report.verdict
                 return found.report
-        return self._live.report(made_at_us)
+        live = self._live.report(made_at_us)
+        if not isinstance(live, Refusal):
+            self.verdict = live.verdict
+        return live

@@ -15,7 +15,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Final, NamedTuple
 
 _HOST: Final = "127.0.0.1"
-#: how long a client may take over its whole request, s
+#: how long a client may take over its request, and as long over the page, s
 _PATIENCE_S: Final = 5.0
 _MOST_CLIENTS: Final = 16
 #: how often the end is looked for, s
@@ -36,7 +36,9 @@ def served(text: str) -> ServedPage:
 
 
 class PageServer:
-    """Serves what `page` returns, in threads of its own. Raises OSError where the port is taken."""
+    """Serves what `page` returns, in threads of its own; the first fault of making it is in `fault`. Raises OSError
+    where the port is taken.
+    """
 
     def __init__(self, page: Callable[[], ServedPage], port: int = 0) -> None:
         token = secrets.token_urlsafe(24)
@@ -47,6 +49,11 @@ class PageServer:
         #: the address for a browser
         self.address = f"http://{_HOST}:{taken}/{token}/"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(_POLL_S,), name="page", daemon=True)
+
+    @property
+    def fault(self) -> Exception | None:
+        """Why no page could be made."""
+        return self._server.fault
 
     def __enter__(self) -> "PageServer":
         self._thread.start()
@@ -63,6 +70,7 @@ class _Server(ThreadingHTTPServer):
     page: Callable[[], ServedPage]
     path: str
     hosts: set[str]
+    fault: Exception | None = None
 
     def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
         super().__init__(address, handler)
@@ -75,13 +83,9 @@ class _Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        late = threading.Timer(_PATIENCE_S, _ended, (request,))
-        late.daemon = True
-        late.start()
         try:
             super().process_request_thread(request, client_address)
         finally:
-            late.cancel()
             self.free.release()
 
     def handle_error(self, request: object, client_address: object) -> None:
@@ -100,6 +104,16 @@ class _Handler(BaseHTTPRequestHandler):
     sys_version = ""
     timeout = _PATIENCE_S
 
+    def setup(self) -> None:
+        super().setup()
+        self._late = threading.Timer(_PATIENCE_S, _ended, (self.request,))
+        self._late.daemon = True
+        self._late.start()
+
+    def finish(self) -> None:
+        self._late.cancel()
+        super().finish()
+
     def do_GET(self) -> None:
         self._answer(with_body=True)
 
@@ -111,7 +125,13 @@ class _Handler(BaseHTTPRequestHandler):
         if self.headers.get("Host") not in self.server.hosts or not known:
             self.send_error(HTTPStatus.NOT_FOUND)
             return
-        page = self.server.page()
+        self._late.cancel()  # it has asked; how long the page takes is not its fault
+        try:
+            page = self.server.page()
+        except Exception as error:  # noqa: BLE001  the owner of the server has to know
+            self.server.fault = error
+            self.send_error(HTTPStatus.INTERNAL_SERVER_ERROR)
+            return
         same = self.headers.get("If-None-Match") == page.tag
         self.send_response(HTTPStatus.NOT_MODIFIED if same else HTTPStatus.OK)
         self.send_header("ETag", page.tag)

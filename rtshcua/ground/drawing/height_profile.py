@@ -36,6 +36,7 @@ from rtshcua.ground.drawing.drawn_site import (
     planned_legs,
 )
 from rtshcua.ground.drawing.flat_site import told_band
+from rtshcua.ground.drawing.time_charts import clock
 from rtshcua.ground.drawing.zone_map import (
     AT_TIMES,
     ZONE_KEYS,
@@ -65,7 +66,7 @@ _TIMES: Final = tuple(
     each * 1_000_000 for each in (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 18_000, 36_000, 86_400)
 )
 #: us
-_SECOND, _HOUR = 1_000_000, 3_600_000_000
+_SECOND = 1_000_000
 
 
 class ZoneBand(NamedTuple):
@@ -217,7 +218,7 @@ def flown_heights(site: Site, flown: FlownWay) -> HeightProfile:
     last = max([place.along for place in everything] + [mark.t_us for mark in flown.marks])
     parts = tuple(_zone_parts(site, map(_thinned, lines)))
     axes = _axes(site, [*everything, everything[-1]._replace(along=last)], parts)
-    across = [AxisMark(axes.x(at), told_time(at)) for at in range(0, last + 1, _round(axes.last, _TIMES))]
+    across = [AxisMark(axes.x(at), clock(at // _SECOND)) for at in range(0, last + 1, _round(axes.last, _TIMES))]
     highest = _told(max(place.height for place in everything))
     return _profile(
         site,
@@ -252,13 +253,6 @@ def _flown(
             for mark in flown.marks
         ),
     )
-
-
-def told_time(t_us: int) -> str:
-    """A time since the beginning of a flight, as `m:ss` or `h:mm:ss`."""
-    minutes, seconds = divmod(t_us // _SECOND, 60)
-    hours, rest = divmod(minutes, 60)
-    return f"{hours}:{rest:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
 
 
 def _thinned(line: Sequence[_Place]) -> Sequence[_Place]:

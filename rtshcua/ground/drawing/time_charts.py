@@ -91,9 +91,8 @@ class DrawnLine(NamedTuple):
 
 
 class TimeChart(NamedTuple):
-    """A chart on the page. `marks` are places of values with their words;
-    `limits` are those in the chart, each with its other edge, `described` the words of all; `scale` is the value at the
-    top and at the bottom.
+    """A chart on the page. `marks` are places of values with their words, `limits` those in the chart, each with its
+    other edge, and `described` the words of all.
     """
 
     title: str
@@ -107,7 +106,6 @@ class TimeChart(NamedTuple):
     lines: tuple[DrawnLine, ...]
     limits: tuple[tuple[float, str, float], ...]
     described: tuple[str, ...]
-    scale: tuple[float, float]
 
 
 def time_chart(
@@ -133,7 +131,7 @@ def time_chart(
     return TimeChart(
         title, description, unit, bottom + _FOOT, top, bottom, axis,
         tuple(zip(map(at, ticks), words, strict=True)), tuple(drawn), tuple(shown),
-        tuple(limit.told for limit in limits), (high, low),
+        tuple(limit.told for limit in limits),
     )  # fmt: skip
 
 

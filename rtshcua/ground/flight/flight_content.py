@@ -116,7 +116,8 @@ class FlightReport(NamedTuple):
     """Everything that a page shows of one flight.
 
     `highest` is the greatest height above home, and `distance` that over ground, by the telemetry. `verdict` is that
-    of the verification that made the page: `verified`, `incomplete` or `failed`. `log` is the
+    of the verification that made the page, `verified`, `incomplete` or `failed`; or else the log is still `growing`, or
+    closed and `unverified`. `log` is the
     log as the page embeds it, empty if it is too large; `redacted` names what was removed.
     `projection` is that of the local plane. `simulated`: the flight says that nothing flew.
     """

@@ -33,7 +33,7 @@ Output = Annotated[
     typer.Option(
         "-o", "--output", metavar="FILE|FOLDER",
         help="the page, or for several flights the folder to write "
-        "[default: RUN.html or `logbook`, flight-1.html if redacted; standard output if piped]",
+        "[default: RUN.html or `logbook`, flight-1.html if redacted; one page is piped]",
     ),
 ]  # fmt: skip
 Root = Annotated[
@@ -117,8 +117,9 @@ def _target(output: Path | None, logs: Sequence[Path], *, redacted: bool, as_jso
         if as_json or (not several and not sys.stdout.isatty()):
             return None
         output = default_target(logs, redacted=redacted)
-    elif str(output) == "-" and not several:
-        return None
+    elif str(output) == "-":
+        text = "several flights make a folder of pages, which cannot be on standard output"
+        return Refusal("usage", text, "name a folder with `-o`", code=ExitCode.USAGE) if several else None
     return target_of(output, logs, redacted=redacted)
 
 

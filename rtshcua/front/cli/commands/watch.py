@@ -64,6 +64,8 @@ def watch(
         while not stop.asked:
             time.sleep(_EVERY_S)
             page.update()
+            if server.fault is not None:
+                raise server.fault
     if as_json:
         page.current()  # a closed log is verified, also if nobody looked
         out_json(json.dumps({"closed": page.closed, "verdict": page.verdict}))

@@ -12,15 +12,14 @@ from typing import Any, Final, NamedTuple
 from shapely import Polygon, box, get_parts, make_valid
 from shapely.geometry.polygon import orient
 
+from rtshcua.decision.outline import rings
+from rtshcua.ground.drawing.drawn_site import planned_legs
+from rtshcua.ground.drawing.flat_site import is_timed, limits_of, site_of, way_of
 from rtshcua.ground.flight.flown import Flight
-from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import (
-    AREA,
     CIRCLE,
     HALF_TURN,
-    HIGHEST,
-    LOWEST,
     TURN,
     Projection,
     Zone,
@@ -64,37 +63,31 @@ def zone_shapes(policy: Policy) -> Iterator[ZoneShape]:
         yield ZoneShape(
             zone.name,
             "inside" if index in inside else "outside" if index in outside else "",
-            None if zone.floor <= LOWEST else zone.floor,
-            None if zone.ceiling >= HIGHEST else zone.ceiling,
+            *limits_of(zone),
             isqrt(zone.data[2]) if zone.shape == CIRCLE else None,
-            bool(zone.daily or zone.weekly or zone.dates),
+            is_timed(zone),
             tuple(_areas(zone, policy.projection)),
         )
 
 
 def _areas(zone: Zone, projection: Projection) -> Iterator[GeoArea]:
-    rings = [
-        tuple(_unrolled(projection, x, y) for x, y in zip(ring[::2], ring[1::2], strict=True)) for ring in _rings(zone)
-    ]
-    for ring in filter(_is_outer, rings):
+    unrolled = [tuple(_unrolled(projection, x, y) for x, y in ring) for ring in _rings(zone)]
+    for ring in filter(_is_outer, unrolled):
         outer = make_valid(Polygon(ring))  # rounding to 1e-7 degree, and the poles, can make a ring touch itself
-        holes = [hole for hole in rings if not _is_outer(hole) and outer.contains(Polygon(hole).representative_point())]
+        holes = [
+            hole for hole in unrolled if not _is_outer(hole) and outer.contains(Polygon(hole).representative_point())
+        ]
         yield from cut_area(make_valid(Polygon(ring, holes)))
 
 
-def _rings(zone: Zone) -> Iterator[Sequence[int]]:
-    if zone.shape == CIRCLE:
-        x, y, square = zone.data
-        radius = square**0.5
-        turns = [2 * pi * number / CORNERS for number in range(CORNERS)]
-        yield [part for turn in turns for part in (x + int(radius * cos(turn)), y + int(radius * sin(turn)))]
-    elif zone.shape == AREA:
-        at = 1 + zone.data[0]
-        for corners in zone.data[1:at]:
-            yield zone.data[at : at + 2 * corners]
-            at += 2 * corners
-    else:
-        yield zone.data
+def _rings(zone: Zone) -> Iterator[Sequence[Place]]:
+    if zone.shape != CIRCLE:
+        yield from rings(zone)
+        return
+    x, y, square = zone.data
+    radius = square**0.5
+    turns = [2 * pi * number / CORNERS for number in range(CORNERS)]
+    yield [(x + int(radius * cos(turn)), y + int(radius * sin(turn))) for turn in turns]
 
 
 def _is_outer(ring: Ring) -> bool:
@@ -152,43 +145,20 @@ def cut_line(points: Sequence[tuple[int, ...]]) -> list[list[tuple[int, ...]]]:
 
 
 class PlannedPoint(NamedTuple):
-    """A corner of the planned path: the index of its step, the place, and its height above home in mm."""
+    """A corner of the planned path: its place, and its height above home in mm."""
 
-    step: int
     longitude: int
     latitude: int
     above_home: int
 
 
 def planned_path(flight: Flight) -> tuple[PlannedPoint, ...]:
-    """The path that the mission plans, from the declared home if it begins with a climb. A return climbs to its
-    altitude, crosses and lands.
-    """
-    projection, limits = flight.policy.projection, flight.policy.vehicle
+    """The path that the mission plans, from the ground at the declared home; empty if nothing moves."""
     path: list[PlannedPoint] = []
-    at, height = (0, 0), 0
-
-    def go(step: int, to: tuple[int, int], above_home: int) -> None:
-        latitude, longitude = unproject(projection, *to)
-        point = PlannedPoint(step, longitude, latitude, above_home)
-        if not path or path[-1][1:] != point[1:]:
+    legs = tuple(planned_legs(way_of(flight.mission), site_of(flight.policy)))
+    for x, y, above_home in (*(each.begin for each in legs[:1]), *(each.end for each in legs)):
+        latitude, longitude = unproject(flight.policy.projection, x, y)
+        point = PlannedPoint(longitude, latitude, above_home)
+        if path[-1:] != [point]:
             path.append(point)
-
-    for step, invocation in enumerate(flight.mission.invocations):
-        plan = invocation.plan
-        places = list(zip(plan.path[::2], plan.path[1::2], strict=True))
-        if not path and plan.kind == MotionKind.CLIMB:
-            go(step, at, height)
-        if plan.kind in (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER):
-            height = plan.altitude
-        if plan.kind == MotionKind.HOME:
-            height = max(height, limits.return_altitude)
-        if plan.kind in (MotionKind.CLIMB, MotionKind.HOME) and path:
-            go(step, at, height)
-        for place in places:
-            go(step, place, height)
-        at = places[-1] if places else at
-        if plan.kind in (MotionKind.HOME, MotionKind.LAND) and path:
-            height = 0
-            go(step, at, height)
     return tuple(path)

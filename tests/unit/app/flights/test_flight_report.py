@@ -11,6 +11,7 @@ from reference import bound_run
 from reference.forgery import edit, signed
 from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, flight_report
+from rtshcua.app.flights.watched import WatchedPage
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.app import main
@@ -199,6 +200,38 @@ def test_growing_log_is_told_as_far_as_it_goes(completed: Path, tmp_path: Path) 
     assert found.timeline == whole.timeline
     assert found.decisions == whole.decisions
     assert "Not verified yet" in found.verified
+    assert found.verdict == "unverified"
+
+
+def test_break_of_a_growing_log_is_told_until_it_is_mended(completed: Path, tmp_path: Path) -> None:
+    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(b"".join(lines[:9]))
+    live = LiveFlight(log, ())
+    assert live.update()
+
+    def breaks_off() -> bool:
+        found = live.report(MADE_US)
+        assert isinstance(found, FlightReport)
+        return "breaks off" in found.summary[3].answer
+
+    assert not breaks_off()
+    for wrong, told in (([*lines[:9], b"no record\n"], True), (lines[:8], True), (lines[:10], False)):
+        log.write_bytes(b"".join(wrong))
+        assert live.update()
+        assert not live.update()
+        assert breaks_off() == told
+
+
+def test_closed_log_that_nobody_verifies_does_not_fly(completed: Path) -> None:
+    watched = WatchedPage(completed / "log.jsonl", None)
+    text = watched.current()
+    watched.update()
+    assert watched.closed
+    assert watched.verdict == "unverified"
+    assert "Not verified" in text
+    assert "Still flying" not in text
+    assert "growing-note" not in text.partition("<script")[0]
 
 
 def test_autopilots_log_that_is_bound_to_this_flight_is_told_and_no_other(tmp_path: Path) -> None:

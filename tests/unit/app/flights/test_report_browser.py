@@ -1,6 +1,7 @@
 """The report in a browser: it fits, in light and dark, has one cursor for all drawings, and verifies itself."""
 
 import random
+import time
 from collections.abc import Iterator
 from math import asinh, pi, radians, tan
 from pathlib import Path
@@ -67,19 +68,31 @@ def test_page_is_accessible_and_fetches_nothing(
 
 @NEEDS_AXE
 def test_logbook_is_accessible_and_sorts(browser: Browser, tmp_path: Path, completed: Path, turned: Path) -> None:
-    entries = [LogbookEntry(f"{run.parent.name}.html", report_of(run).report) for run in (completed, turned)]
+    whole, early = (report_of(run).report for run in (completed, turned))
+    lasted, highest = whole.lasted_us, whole.highest or 0
+    flights = {  # each column has another order
+        "a": whole._replace(lasted_us=lasted * 2, highest=highest, ending="completed"),
+        "b": early._replace(lasted_us=lasted, highest=highest * 3, ending="interrupted"),
+        "c": early._replace(lasted_us=lasted * 3, highest=highest * 2, ending="aborted"),
+    }
+    by_time, by_height, by_ending = ["b", "a", "c"], ["a", "c", "b"], ["c", "a", "b"]
+    entries = [LogbookEntry(name, each) for name, each in flights.items()]
     with opened(browser, file_of(tmp_path, logbook_page(entries, "now", "us"))) as shown:
         assert shown.axe() == []
+
+        def links() -> list[str]:
+            return [each.get_attribute("href") or "" for each in shown.page.locator("tbody a").all()]
 
         def column(number: int) -> list[str]:
             return shown.page.locator(f"tbody td:nth-child({number})").all_inner_texts()
 
-        for number, name in ((4, "Lasted"), (6, "Highest"), (8, "Ended")):
+        for number, name, up in ((4, "Lasted", by_time), (6, "Highest", by_height), (8, "Ended", by_ending)):
             shown.page.get_by_role("button", name=name).click()
-            up = column(number)
+            assert links() == up, name
             shown.page.get_by_role("button", name=name).press("Enter")
-            assert column(number) == up[::-1]
+            assert links() == up[::-1], name
             assert shown.page.locator("th[aria-sort]").inner_text() == name
+            assert len(set(column(number))) > 1
         assert shown.errors == []
 
 
@@ -131,8 +144,11 @@ def test_tiles_are_fetched_when_asked_for_and_lie_where_they_belong(
         shown.page.get_by_label("Fetch map tiles from https://tiles.example").check()
         images = shown.page.locator("svg image")
         assert 1 <= images.count() <= 64
-        shown.page.wait_for_timeout(200)
-        assert len(shown.requests) == 1 + images.count()
+        fetched = 1 + images.count()
+        deadline_s = time.monotonic() + 10
+        while len(shown.requests) < fetched and time.monotonic() < deadline_s:
+            shown.page.wait_for_timeout(20)
+        assert len(shown.requests) == fetched
         # the tile that has home in it, by the definition of Web Mercator
         assert report.projection is not None
         latitude, longitude = report.projection.latitude / 1e7, report.projection.longitude / 1e7

@@ -1,6 +1,7 @@
 """`rtshcua bind`: what it writes, tells and refuses, and what `show` and `verify-log` make of it."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 
 from reference.autopilot_logs import ardupilot_log, px4_log
 from reference.bound_run import ROOT, bind_words, flight_of, recorded, run_folder, with_log
-from rtshcua.app.autopilot_bindings import FoundBinding, agreement_of, read_bindings
+from rtshcua.app.autopilot_bindings import FoundBinding, read_bindings
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.ground.flight.autopilot_log import AutopilotPoint
@@ -60,7 +61,6 @@ def test_binding_of_the_flights_own_log(name: str, write: Any, run: Path, capsys
     assert binding.vertical < 200
     assert binding.error_us < 100_000
     assert not binding.deviations
-    assert agreement_of(binding).agreed == binding.agreed
     shown = verified(run, capsys)
     assert name in claims(shown, "proven")["autopilot"]
     assert not claims(shown, "unproven")
@@ -189,3 +189,12 @@ def test_positions_without_motion_are_compared_too(run: Path, capsys: pytest.Cap
     told = bound(run, run / "flight.ulg", capsys)["binding"]
     assert told["agreed"] == 0
     assert len(told["deviations"]) == 1
+
+
+@pytest.mark.parametrize("name", [b"a\nb.ulg", b"a\xe2\x80\xaeb.ulg", b"\xff.ulg"])
+def test_file_whose_name_cannot_be_shown_is_refused(
+    name: bytes, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / os.fsdecode(name)
+    file.write_bytes(with_log(run).read_bytes())
+    assert refused(run, file, capsys, ExitCode.INPUT) == "input"

@@ -124,3 +124,8 @@ def test_an_imported_source_is_not_replaced_either(at: Path) -> None:
     (at / "past.rts").write_text('import "policy.rts"\n' + MISSION.format(*GOOD))
     assert check("past.rts", "--map", "policy.rts") != ExitCode.OK
     assert (at / "policy.rts").read_text() == 'import "lib:policies/bridge_inspection.rts"\n'
+
+
+def test_map_and_picture_are_two_files() -> None:
+    assert check("past.rts", "--map", "one.svg", "--picture", "one.svg") != ExitCode.DIAGNOSTICS
+    assert not Path("one.svg").exists()

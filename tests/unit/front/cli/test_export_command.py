@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -223,3 +224,12 @@ def test_file_with_another_name_is_not_overwritten(capsys: pytest.CaptureFixture
     assert Path("notes.md").read_text(encoding="utf-8") == "notes"
     for name in ("new.md", "flight.KML", "flight.KML"):
         assert export(f"runs/{RUN}", "--to", "kml", "-o", name) == ExitCode.OK
+
+
+def test_telemetry_of_another_run_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:
+    other = Path("runs", "other")
+    shutil.copytree(Path("runs", RUN), other)
+    before = (other / "telemetry.tlog").read_bytes()
+    for name in ("telemetry.tlog", "log.jsonl"):
+        assert "not overwritten" in refused(capsys, f"runs/{RUN}", "--to", "tlog", "-o", str(other / name))
+    assert (other / "telemetry.tlog").read_bytes() == before

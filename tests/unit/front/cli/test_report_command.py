@@ -213,11 +213,12 @@ def test_failed_flight_says_so_first_and_counts_in_no_total(runs: Path, capsys: 
     capsys.readouterr()
 
 
+@pytest.mark.parametrize("limit", ["MOST_OCTETS", "_MOST_EMBEDDED"])
 @pytest.mark.parametrize("redacted", [[], ["--redact", "names"]])
 def test_log_that_is_too_large_is_not_embedded_in_part(
-    redacted: list[str], runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    redacted: list[str], limit: str, runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rtshcua.app.flights.flight_report.MOST_OCTETS", 10_000)
+    monkeypatch.setattr(f"rtshcua.app.flights.flight_report.{limit}", 1_000)
     assert main(["report", str(runs / "a"), *redacted, *ROOT]) == ExitCode.OK
     page = capsys.readouterr().out
     assert "the log is too large to be embedded" in page
@@ -247,3 +248,9 @@ def test_telemetry_that_was_removed_is_told_as_missing(
     assert {"what": "telemetry", "told": "the file that the log names is not beside it: no track, no signals"} in told[
         "gaps"
     ]
+
+
+def test_several_flights_do_not_go_to_standard_output(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(runs), "-o", "-", *ROOT]) == ExitCode.USAGE
+    assert "cannot be on standard output" in capsys.readouterr().err
+    assert not Path("-").exists()

@@ -2,6 +2,7 @@
 
 import http.client
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -9,7 +10,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rtshcua.front.web.page_server import PageServer, served
+from rtshcua.front.web import page_server
+from rtshcua.front.web.page_server import PageServer, ServedPage, served
 
 
 class Site:
@@ -73,14 +75,46 @@ def test_only_the_loopback_interface_listens(site: Site) -> None:
     assert site.url.hostname == "127.0.0.1"
 
 
-def test_half_open_clients_do_not_keep_others_out(site: Site) -> None:
+def half_open(site: Site, number: int) -> list[socket.socket]:
+    """Clients that say nothing."""
     assert site.url.hostname is not None
-    links = [socket.create_connection((site.url.hostname, site.url.port or 0)) for _ in range(40)]
-    time.sleep(0.2)
+    return [socket.create_connection((site.url.hostname, site.url.port or 0)) for _ in range(number)]
+
+
+def test_half_open_clients_do_not_keep_others_out(site: Site) -> None:
+    links = half_open(site, page_server._MOST_CLIENTS - 1)
+    assert site.ask()[0] == 200
     for link in links:
         link.close()
-    time.sleep(0.2)
-    assert site.ask()[0] == 200
+
+
+def test_too_many_half_open_clients_are_ended(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page_server, "_PATIENCE_S", 0.2)
+    links = half_open(site, 40)
+    end_s, status = time.monotonic() + 20, 0
+    while status != 200:
+        assert time.monotonic() < end_s
+        with suppress(OSError, http.client.HTTPException):
+            status = site.ask()[0]
+    for link in links:
+        link.close()
+
+
+def test_page_that_takes_long_to_make_is_served(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page_server, "_PATIENCE_S", 0.2)
+    ended = threading.Event()
+    site.server._server.page = lambda: served("late") if not ended.wait(0.6) else served("")
+    assert site.ask()[::2] == (200, b"late")
+    assert site.server.fault is None
+
+
+def test_fault_of_making_the_page_is_told(site: Site) -> None:
+    def wrong() -> ServedPage:
+        raise RuntimeError("no page")
+
+    site.server._server.page = wrong
+    assert site.ask()[0] == 500
+    assert str(site.server.fault) == "no page"
 
 
 def test_garbage_is_answered_and_forgotten(site: Site) -> None:

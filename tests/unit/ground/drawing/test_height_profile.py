@@ -19,7 +19,7 @@ from rtshcua.ground.drawing.drawn_site import (
     ZoneOutline,
     ZoneView,
 )
-from rtshcua.ground.drawing.height_profile import HeightProfile, flown_heights, inside, planned_heights, told_time
+from rtshcua.ground.drawing.height_profile import HeightProfile, flown_heights, inside, planned_heights
 from rtshcua.model.flat.contract import MotionKind
 
 
@@ -187,10 +187,3 @@ def test_parts_inside_match_a_walk_along_the_line(
         )
         if not edges:
             assert contains(ground, x, y) == any(begin < share < end for begin, end in parts)
-
-
-@pytest.mark.parametrize(
-    ("t_us", "told"), [(0, "0:00"), (59_999_999, "0:59"), (61_000_000, "1:01"), (3_661_000_000, "1:01:01")]
-)
-def test_times_are_told_in_minutes(t_us: int, told: str) -> None:
-    assert told_time(t_us) == told

@@ -10,6 +10,7 @@ from typing import Any
 
 import geojson as geojson_library
 import gpxpy
+import msgspec
 import pytest
 from fastkml import KML
 from fastkml import kml as fast
@@ -31,6 +32,7 @@ from reference.exported_flight import (
 )
 from rtshcua.ground.flight.export.csv_table import csv_table
 from rtshcua.ground.flight.export.exported import FlightExport
+from rtshcua.ground.flight.export.geo_shapes import planned_path
 from rtshcua.ground.flight.export.geojson_file import geojson
 from rtshcua.ground.flight.export.gpx import gpx
 from rtshcua.ground.flight.export.kml import kml
@@ -220,6 +222,19 @@ def test_nothing_passes_longitude_180(export: FlightExport) -> None:
     for zone in found["zone"]:
         for polygon in getattr(shape(zone["geometry"]), "geoms", [shape(zone["geometry"])]):
             assert polygon.bounds[2] - polygon.bounds[0] < 1
+
+
+def test_planned_path_is_that_of_the_drawings(export: FlightExport) -> None:
+    """A return from above home only descends, also below the height of returns."""
+    policy, mission = export.flight.policy, export.flight.mission
+    climb, home = mission.invocations[0], mission.invocations[-1]
+    above = msgspec.structs.replace(mission, invocations=(climb, home))
+    flight = export.flight._replace(
+        mission=above,
+        policy=msgspec.structs.replace(policy, vehicle=msgspec.structs.replace(policy.vehicle, return_altitude=30_000)),
+    )
+    assert climb.plan.altitude < 30_000
+    assert [each.above_home for each in planned_path(flight)] == [0, climb.plan.altitude, 0]
 
 
 def test_a_cut_keeps_the_area(export: FlightExport) -> None:

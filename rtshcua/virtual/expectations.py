@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, assert_never
 
 import msgspec
 
-from rtshcua.decision.watch import WAY_HOME
+from rtshcua.decision.running_conditions import WAY_HOME
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.outcome import Reason

@@ -11,17 +11,17 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 873,
-    "code lines": 103_820,  # rises with each feature: last the report of a flight
+    "modules": 871,
+    "code lines": 104_000,  # to the thousand; rises with each feature: last the report of a flight
     "shared class names": 0,
     "of them across packages": 0,
-    "shared file names": 70,
+    "shared file names": 69,
     "import cycles": 0,
-    "modules below 80 lines with one importer": 15,
+    "modules below 80 lines with one importer": 13,
     "functions of more than 60 lines": 0,
-    "functions of a complexity over 15": 72,
+    "functions of a complexity over 15": 66,
     "functions of a complexity over 25": 0,
-    "lines of application logic in the command line": 917,
+    "lines of application logic in the command line": 893,
 }
 
 

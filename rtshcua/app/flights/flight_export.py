@@ -1,6 +1,6 @@
 """The service `export`: a flight as a file for other programs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -8,6 +8,7 @@ from rtshcua import __version__
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, TELEMETRY
+from rtshcua.adapters.store.writing import write_out
 from rtshcua.app.documents import kind_of, no_log
 from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.flights.telemetry_told import doubts
@@ -28,7 +29,7 @@ from rtshcua.evidence.records import DecisionRecord, Effect, Genesis
 from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.flight.export import CSV, FORMATS, GEOJSON, GPX, KML, MCAP, PLAN, TLOG
 from rtshcua.ground.flight.export.exported import FlightExport, ToldRecord, with_usable_track
-from rtshcua.ground.flight.flown import Flight
+from rtshcua.ground.flight.flown import Flight, FlightTelemetry
 from rtshcua.ground.flight.track import home_of
 from rtshcua.wire.request import STEP
 
@@ -92,7 +93,7 @@ def name_for(run: Path, format: str) -> Path:
 
 
 def export(request: ExportRequest) -> ExportedFile | Refusal:
-    """Make the file; it is not written here. Raises OSError."""
+    """Make the file, and write it if there is a target. Raises OSError."""
     refused = accepted(request.format) or _unwritable(request.target, log_of(request.run), request.format)
     if refused is not None:
         return refused
@@ -112,15 +113,22 @@ def export(request: ExportRequest) -> ExportedFile | Refusal:
     made = _made(request.format, exported, log)
     if isinstance(made, Refusal):
         return made
-    warnings = list(made.warnings)
-    if dropped and request.format not in (PLAN, TLOG):
-        warnings.append(f"left out {many(dropped, 'position')} with an impossible place or time")
-    damaged = None if flight.telemetry is None else flight.telemetry.damaged
-    if flight.telemetry is not None and request.format not in (PLAN, TLOG):
-        warnings += [f"the telemetry: {each}" for each in doubts(flight.telemetry)]
-    if damaged is not None and request.format not in (PLAN, TLOG):
-        warnings.append(f"the telemetry is damaged from byte {damaged} on; what follows was not read")
-    return ExportedFile(made.data, made.points, made.datum, status, tuple(warnings))
+    if request.target is not None:
+        write_out(request.target, made.data)
+    warnings = made.warnings
+    if request.format not in (PLAN, TLOG):
+        warnings += tuple(_warnings(flight.telemetry, dropped))
+    return ExportedFile(made.data, made.points, made.datum, status, warnings)
+
+
+def _warnings(telemetry: FlightTelemetry | None, dropped: int) -> Iterator[str]:
+    """Yield what an export of telemetry leaves out or leaves open."""
+    if dropped:
+        yield f"left out {many(dropped, 'position')} with an impossible place or time"
+    if telemetry is not None:
+        yield from (f"the telemetry: {each}" for each in doubts(telemetry))
+        if telemetry.damaged is not None:
+            yield f"the telemetry is damaged from byte {telemetry.damaged} on; what follows was not read"
 
 
 def _unwritable(target: Path | None, log: Path, format: str) -> Refusal | None:

@@ -112,25 +112,29 @@ class FlightSummary:
         told = f"The policy `{policy.name}`, version {policy.version}{self._signers()}"
         if self._flight.genesis.mode == "none":
             return f"Nobody had to: in mode `none` nothing is enforced. {told} was only compared with what flew."
+        return " ".join([f"{told}.", *(self._approved() or ["No person was asked to approve a step."])])
+
+    def _approved(self) -> list[str]:
+        """Sentences on what persons were asked; empty if they were not."""
         answers = list(self._effects("approval"))
-        answered = {each.step for each in answers}
-        waited = {
+        asked = {
             each.step
             for each in self._flight.records
             if isinstance(each, DecisionRecord) and each.kind == STEP and each.reason in _ASKS
         }
-        parts = [f"{told}."]
+        parts = []
         for granted, what in ((True, "Granted by signature"), (False, "Refused by signature")):
             meant = (each for each in answers if self._collected.answers.get(each.seq) is granted)
             some = [f"{step_words(each.step)}{self._who(each)}" for each in meant]
             if some:
                 parts.append(f"{what}: {_listed(some, '; ')}.")
-        if waited - answered:
-            numbers = ", ".join(str(number_of(step)) for step in sorted(waited - answered))
+        waiting = sorted(asked - {each.step for each in answers})
+        if waiting:
+            numbers = ", ".join(str(number_of(step)) for step in waiting)
             parts.append(f"A person was asked to approve step {numbers}, and nobody answered.")
-        if not answers and not waited:
-            parts.append("No person was asked to approve a step.")
-        return " ".join(parts)
+        if answers and not parts:
+            parts.append("The answers that were recorded make no sense.")
+        return parts
 
     def _who(self, record: Effect) -> str:
         return f": {self._names.detail(record)}" if self._details else ""

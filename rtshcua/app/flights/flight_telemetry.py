@@ -223,6 +223,16 @@ class TelemetryReading:
     def _read(self, t_us: int, kind: _Kind, frame: ReceivedFrame) -> None:
         message: Any = frame.message
         vehicle, number = kind.vehicle, kind.number
+        self._keep(t_us, vehicle, number, message)
+        if frame.name in self._needed and t_us >= vehicle.signals_due.get(number, t_us):
+            if self._thinning.others_us:
+                vehicle.signals_due[number] = t_us + self._thinning.others_us
+            for slot, value in vehicle.telemetry.read(frame.name, message, AUTOPILOT, now_us=t_us):
+                if slot in vehicle.values:
+                    vehicle.values[slot].append((t_us, value))
+
+    def _keep(self, t_us: int, vehicle: _Vehicle, number: int, message: Any) -> None:
+        """Keep what is no signal."""
         if number == HEARTBEAT:
             vehicle.known = vehicle.known or is_vehicle(message.type, message.autopilot)
         elif number == GLOBAL_POSITION_INT:
@@ -237,12 +247,6 @@ class TelemetryReading:
             vehicle.ground = _ground(t_us, message.altitude_terrain)
         elif number == STATUSTEXT and len(vehicle.texts) < _MOST_TEXTS:
             vehicle.texts.append(VehicleText(t_us, message.severity, message.text))
-        if frame.name in self._needed and t_us >= vehicle.signals_due.get(number, t_us):
-            if self._thinning.others_us:
-                vehicle.signals_due[number] = t_us + self._thinning.others_us
-            for slot, value in vehicle.telemetry.read(frame.name, message, AUTOPILOT, now_us=t_us):
-                if slot in vehicle.values:
-                    vehicle.values[slot].append((t_us, value))
 
     def _place(self, t_us: int, vehicle: _Vehicle, message: Any) -> None:
         ground = vehicle.ground

@@ -9,10 +9,11 @@ from rtshcua.app.autopilot_bindings import agreed, apart, described
 from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.flights.flight_summary import FlightSummary
 from rtshcua.app.flights.flight_timeline import timeline
-from rtshcua.app.flights.signal_limits import signal_limits
 from rtshcua.app.flights.telemetry_told import doubts, silences
 from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import many, seconds, true_to, utc
+from rtshcua.decision.tree import AtMost, Both, CodeScope, Either, Negation, Node, parse, scope_of
+from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.records import Close, Effect
 from rtshcua.evidence.report import LogReport
@@ -22,10 +23,14 @@ from rtshcua.ground.flight.flight_content import (
     FlightReport,
     GapView,
     SignalCurve,
+    SignalLimit,
     TrackView,
 )
 from rtshcua.ground.flight.flown import Flight
 from rtshcua.ground.flight.track import distance, home_of, place_at
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.wire.autopilot_binding import AutopilotBinding
 
@@ -37,8 +42,7 @@ def flight_told(
     """The content of the page of a flight, without the log. `report` is that of its verification, None while it flies;
     `bindings` are trusted ones; `pinned` names the root key. Without `details` texts from outside are left out.
     """
-    genesis, last = flight.genesis, flight.records[-1]
-    ending = last.ending if isinstance(last, Close) else "flying" if report is None else "not closed"
+    genesis, ending = flight.genesis, _ending(flight, report)
     track = _track(flight)
     summary = FlightSummary(report, flight, collected, track, ending=ending, made_at_us=made_at_us, details=details)
     assert collected.names is not None
@@ -56,7 +60,7 @@ def flight_told(
         steps=len(flight.mission.invocations),
         highest=None if track is None else max(each.above_home for each in track.points),
         distance=None if track is None else distance(track.points, track.places),
-        verdict=report.verdict.value if report is not None else "growing" if ending == "flying" else "unverified",
+        verdict=_verdict(report, ending),
         pinned=pinned,
         origin=origin_of(genesis.vehicle, genesis.boot),
         root="" if report is None else report.root.hex(),
@@ -70,14 +74,31 @@ def flight_told(
         decisions=tuple(each._replace(where=_where(flight, track, each.t_us)) for each in collected.decisions_told()),
         signals=_signals(flight),
         gaps=(*_gaps_of_log(flight, report), *_gaps_of_telemetry(flight), *collected.gaps()),
-        proven=() if report is None else tuple(claim.text for claim in report.proven),
-        unproven=() if report is None else tuple(claim.text for claim in report.unproven),
+        proven=_texts(() if report is None else report.proven),
+        unproven=_texts(() if report is None else report.unproven),
         records=tuple(collected.told),
         totals={} if report is None else dict(report.counts),
         log="",
         redacted=(),
         simulated=any(isinstance(each, Effect) and each.event == SIMULATED for each in flight.records),
     )
+
+
+def _ending(flight: Flight, report: LogReport | None) -> str:
+    last = flight.records[-1]
+    if isinstance(last, Close):
+        return last.ending
+    return "flying" if report is None else "not closed"
+
+
+def _verdict(report: LogReport | None, ending: str) -> str:
+    if report is not None:
+        return report.verdict.value
+    return "growing" if ending == "flying" else "unverified"
+
+
+def _texts(claims: Sequence[Claim]) -> tuple[str, ...]:
+    return tuple(each.text for each in claims)
 
 
 def _track(flight: Flight) -> TrackView | None:
@@ -133,3 +154,64 @@ def _gaps_of_telemetry(flight: Flight) -> Iterator[GapView]:
     if silent:
         named = ", ".join(f"`{name}`" for name in silent)
         yield GapView("signals", f"never known in the telemetry: {named}")
+
+
+def signal_limits(policy: Policy, steps: Sequence[Invocation]) -> dict[int, tuple[SignalLimit, ...]]:
+    """The limits by state slot: of a comparison of one signal with a constant, the side on which the condition that has
+    to hold is false. `steps` are all that were ever in force; conditions of skills that none of them has are left out.
+    """
+    found: dict[int, dict[tuple[int, bool], SignalLimit]] = {}
+    scope = scope_of(policy)
+    for clause, holds, told, of in _clauses(policy, steps, scope):
+        node = parse(clause.code, of)
+        if isinstance(node, str):
+            continue
+        for slot, limit, low in _compared(node, holds=holds):
+            text = f"{told}: {' '.join(clause.text.split())}"
+            found.setdefault(slot, {}).setdefault((limit, low), SignalLimit(limit, low, text))
+    return {slot: tuple(limits.values()) for slot, limits in found.items()}
+
+
+def _clauses(
+    policy: Policy, steps: Sequence[Invocation], scope: CodeScope
+) -> Iterator[tuple[Clause, bool, str, CodeScope]]:
+    """Yield conditions, whether they have to hold or must not hold, whose they are, and their scope."""
+    for contract in dict.fromkeys(each.contract for each in steps):
+        for clause in (*contract.require, *contract.assume, *contract.maintain):
+            yield clause, True, contract.name, scope.about(contract)
+    flown = {each.skill for each in steps}
+    for number, rule in enumerate(policy.rules):
+        about = [at for at in rule.skills or range(len(policy.contracts)) if at in flown]
+        known = all(0 <= at < len(policy.contracts) for at in about)
+        if rule.when is not None and about and known and _counts(policy, rule, about):
+            of = scope.about(*(policy.contracts[at] for at in rule.skills))
+            kind = RuleKind(rule.kind)
+            yield rule.when, kind is RuleKind.PERMIT, f"rule {number + 1}, {kind.name.lower()}", of
+
+
+def _counts(policy: Policy, rule: Rule, about: Sequence[int]) -> bool:
+    """Whether a rule limits one of these skills: a permit need not hold where another rule permits the skill too."""
+    permits = [each for each in policy.rules if each.kind == RuleKind.PERMIT]
+    return rule.kind != RuleKind.PERMIT or any(sum(_is_about(each, at) for each in permits) == 1 for at in about)
+
+
+def _is_about(rule: Rule, skill: int) -> bool:
+    return not rule.skills or skill in rule.skills
+
+
+def _compared(node: Node, *, holds: bool) -> Iterator[tuple[int, int, bool]]:
+    """Yield slot, limit, and whether it is a lower limit. A branch of an `or` that has to hold, or of an `and` that
+    must not hold, is no limit alone.
+    """
+    match node:
+        case Both(left, right) if holds:
+            yield from _compared(left, holds=holds)
+            yield from _compared(right, holds=holds)
+        case Either(left, right) if not holds:
+            yield from _compared(left, holds=holds)
+            yield from _compared(right, holds=holds)
+        case Negation(operand):
+            yield from _compared(operand, holds=not holds)
+        case AtMost(((argument, slot, factor),), bound) if not argument and abs(factor) == 1:
+            # the signal is at most `bound`, or at least `-bound`
+            yield slot, factor * bound, (factor < 0) == holds

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from dataclasses import replace as dataclass_replace
 from functools import cache
+from itertools import chain
 from pathlib import PurePosixPath
 from typing import Any, Final
 
@@ -322,18 +323,24 @@ def _names(flight: Flight, missions: Sequence[Mission], persons: Iterable[str]) 
     """Yield each name with what stands in its place; of a name with two meanings, the last."""
     policy, genesis, vehicle = flight.policy, flight.genesis, flight.policy.vehicle
     signed = f"{policy.name}@{policy.version}"
-    names = [(each, f"role {number}") for number, each in enumerate(policy.roles, 1)]
-    phases = dict.fromkeys((*policy.phases, *(phase for each in missions for phase in each.phases)))
-    names += [(each, f"phase {number}") for number, each in enumerate(phases, 1)]
-    sources = dict.fromkeys((*policy.sources, *(source for each in missions for source in each.sources)))
-    names += [(each, f"source {number}") for number, each in enumerate(sources, 1) if not each.startswith(LIBRARY)]
-    names += [(each.name, f"zone {number}") for number, each in enumerate(policy.zones, 1)]
-    names += [(each, f"person {number}") for number, each in enumerate(dict.fromkeys(persons), 1)]
+    sources = chain(policy.sources, *(each.sources for each in missions))
+    names = [
+        *_numbered("role", policy.roles),
+        *_numbered("phase", chain(policy.phases, *(each.phases for each in missions))),
+        *((name, told) for name, told in _numbered("source", sources) if not name.startswith(LIBRARY)),
+        *_numbered("zone", (each.name for each in policy.zones)),
+        *_numbered("person", persons),
+    ]
     names += [(each.proposer, "a proposer") for each in missions]
     names += [(each.name, "the mission") for each in missions]
     names += [(genesis.mission, "the mission"), (policy.name, "the policy"), (signed, "the policy")]
     names += [(each, "the vehicle") for each in (vehicle.identity, vehicle.name, genesis.vehicle)]
     yield from ((name, told) for name, told in names if name)
+
+
+def _numbered(what: str, names: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield each name once, with what it is and its number."""
+    return ((name, f"{what} {number}") for number, name in enumerate(dict.fromkeys(names), 1))
 
 
 def _words(policy: Policy) -> Iterator[tuple[str, str]]:

@@ -71,7 +71,8 @@ class FlightMargins:
 
     def stopping(self, speed: int) -> int:
         """The greatest distance, mm rounded up, from the order to stop at a speed in mm/s (0: its greatest) to the
-        standstill; 0 if the vehicle declares no braking. As `decision/watch.py` predicts it from a fresh state.
+        standstill; 0 if the vehicle declares no braking. As `decision/running_conditions.py` predicts it from a fresh
+        state.
         """
         if not self.braking:
             return 0

@@ -1,12 +1,12 @@
-"""The conditions that must hold while a skill runs, and while a step is awaited (`decision.watch`)."""
+"""The conditions that must hold while a skill runs, and while a step is awaited (`decision.running_conditions`)."""
 
 from collections.abc import Iterable
 from functools import partial
 
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy
+from rtshcua.decision.running_conditions import holding, watch
 from rtshcua.decision.session import may_ask_again
 from rtshcua.decision.values import FALSE, Truth
-from rtshcua.decision.watch import holding, watch
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.situation import Now, State

@@ -12,9 +12,9 @@ from reference import flat_case as flat
 from reference.asking import STEP, loaded, ready
 from reference.flat_case import HEIGHT, NOW, POSITION_X, POSITION_Y, M, S
 from rtshcua.decision.prepare import PreparedPolicy, prepare
+from rtshcua.decision.running_conditions import UNKNOWN_AHEAD, WAY_HOME, ahead, holding, watch
 from rtshcua.decision.situation import situation
 from rtshcua.decision.values import FALSE, MISSING, UNKNOWN
-from rtshcua.decision.watch import UNKNOWN_AHEAD, WAY_HOME, ahead, holding, watch
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import MAX_SPEED
 from rtshcua.model.flat.policy import Policy

@@ -13,9 +13,9 @@ from reference.flat_case import M, S
 from rtshcua.decision.contracts import Energy
 from rtshcua.decision.flying import charge, home_us, landing_us, leg_us, over_ground, rising_us, sinking_us
 from rtshcua.decision.prepare import PreparedPolicy, prepare
+from rtshcua.decision.running_conditions import WAY_HOME, holding
 from rtshcua.decision.values import FALSE, MISSING, TRUE, UNKNOWN, Value, interval, maybe, point
 from rtshcua.decision.volume import UNKNOWN_VOLUME, Volume
-from rtshcua.decision.watch import WAY_HOME, holding
 from rtshcua.decision.zones import PlaceSet
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.limits import FULL

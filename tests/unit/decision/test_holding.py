@@ -5,8 +5,8 @@ from msgspec.structs import replace
 from reference import flat_case as flat
 from reference.asking import POLICY, STEP, loaded, ready
 from reference.flat_case import BATTERY, HEIGHT, NOW, POSITION_X, POSITION_Y, M
+from rtshcua.decision.running_conditions import WAY_HOME, holding
 from rtshcua.decision.values import FALSE, UNKNOWN
-from rtshcua.decision.watch import WAY_HOME, holding
 from virtual.rows import rows
 
 DEGRADE = flat.RULES[-1].text

@@ -9,8 +9,8 @@ from reference import flat_case as flat
 from reference.asking import POLICY, STEP, loaded, ready, with_rules
 from reference.flat_case import BATTERY, FIX, HEIGHT, HOME, HOVER, LAND, LINK, NOW, POSITION_X, POSITION_Y, WIND, M, S
 from rtshcua.decision.fallbacks import DEGRADE, START, choose_contingency, choose_fallback, fallbacks, link_admissible
+from rtshcua.decision.running_conditions import WAY_HOME, watch
 from rtshcua.decision.values import FALSE, MISSING, UNKNOWN, Sets, interval, maybe, point
-from rtshcua.decision.watch import WAY_HOME, watch
 from rtshcua.model.flat.policy import RuleKind
 from virtual.rows import rows
 

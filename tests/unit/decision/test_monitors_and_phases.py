@@ -13,10 +13,10 @@ from rtshcua.decision.evaluate import NO_PHASE
 from rtshcua.decision.fallbacks import choose_contingency, choose_fallback, link_admissible
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare
+from rtshcua.decision.running_conditions import watch
 from rtshcua.decision.situation import is_situation, situation
 from rtshcua.decision.tree import CodeScope, MonitorSays, PhaseIn, monitored, parse, scope_of, slots_read
 from rtshcua.decision.values import Sets
-from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.code import Clause, Op

@@ -15,7 +15,7 @@ from reference.flat_case import GOTO, HOVER, INSPECT, M
 from rtshcua.decision.decide import decide
 from rtshcua.decision.fallbacks import choose_contingency, choose_fallback
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation, prepare_mission
-from rtshcua.decision.watch import watch
+from rtshcua.decision.running_conditions import watch
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Motion, MotionKind, Parameter
 from rtshcua.model.flat.limits import MAX_RULES, MAX_SILENCE, MAX_SLOTS, MAX_STALE, MAX_TEXT, MAX_ZONES

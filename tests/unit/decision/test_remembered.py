@@ -11,7 +11,7 @@ from reference.asking import STEP, loaded, ready
 from reference.flat_case import BATTERY, FIX, HEIGHT, LINK, NOW, POSITION_X, POSITION_Y, WIND, M
 from rtshcua.decision.decide import decide
 from rtshcua.decision.fallbacks import START, choose_contingency, choose_fallback, link_admissible, look_ahead
-from rtshcua.decision.watch import holding, watch
+from rtshcua.decision.running_conditions import holding, watch
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.model.flat.situation import Now, State
 

@@ -13,9 +13,9 @@ from rtshcua.decision.contracts import longest
 from rtshcua.decision.fallbacks import choose_fallback
 from rtshcua.decision.nearest import nearest
 from rtshcua.decision.prepare import PreparedPolicy
+from rtshcua.decision.running_conditions import holding, watch
 from rtshcua.decision.times import DateRange, LocalTime, Times
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.watch import holding, watch
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone

@@ -12,9 +12,9 @@ from reference import rich_worlds, worlds
 from reference.flat_case import M, S
 from rtshcua.decision.fallbacks import choose_fallback
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation
+from rtshcua.decision.running_conditions import watch
 from rtshcua.decision.temporal import initial, observe
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
-from rtshcua.decision.watch import watch
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.mission import Invocation

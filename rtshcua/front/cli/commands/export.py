@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.store.writing import write_out
 from rtshcua.app.flights import flight_export as service
 from rtshcua.app.flights.flight_export import ExportedFile, ExportRequest
 from rtshcua.app.wording import many
@@ -59,7 +58,6 @@ def export(
     if target is None:
         out_bytes(made.data)
         return ExitCode.OK
-    write_out(target, made.data)
     if as_json:
         out_json(json.dumps(_object(to, target, made), ensure_ascii=False))
     else:

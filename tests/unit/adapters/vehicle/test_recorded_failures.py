@@ -11,8 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from recorded.flown import Recorded, command, shipped_policy, stock
 from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.decision.running_conditions import watch
 from rtshcua.decision.values import FALSE, TRUE
-from rtshcua.decision.watch import watch
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.signal import CELL

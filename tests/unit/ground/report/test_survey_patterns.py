@@ -10,9 +10,9 @@ from rtshcua.ground.checker.checks.contracts import PATTERNS as KNOWN
 from rtshcua.ground.geometry.shapes import RoundArea, SimplePolygon
 from rtshcua.ground.geometry.survey import survey
 from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.html_page import pattern as drawn
 from rtshcua.ground.report.prose.rules_and_skills import PATTERNS
 from rtshcua.ground.report.report_model import PolicyReport
-from rtshcua.ground.report.survey_patterns import drawn
 
 M = 1_000
 HOUSE = SimplePolygon(((0, 0), (120 * M, 0), (150 * M, 55 * M), (120 * M, 90 * M), (0, 90 * M)))

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from base64 import b64encode
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,7 @@ HOLDERS = {
     "monocypher": "Loup Vaillant", "libsodium": "Colin Percival", "musl": "Rich Felker", "zig-compiler-rt": "Zig",
 }  # fmt: skip
 COMPILED = HOLDERS.keys()
+VENDORED = {"@noble/ed25519"}
 
 
 @pytest.mark.clients
@@ -103,8 +105,8 @@ def applies(each: Requirement, extras: tuple[str, ...] = ("",)) -> bool:
 
 
 def packages(bill: Any) -> list[Any]:
-    """Its components that are installed with the wheel, not compiled into it."""
-    return [each for each in bill["components"] if each["name"] not in COMPILED]
+    """Its components that are installed with the wheel, neither compiled into it nor copied."""
+    return [each for each in bill["components"] if each["name"] not in COMPILED | VENDORED]
 
 
 @pytest.mark.slow
@@ -126,6 +128,19 @@ def test_bill_of_materials_lists_the_compiled_sources(bill: Any) -> None:
     assert head == f"// Monocypher version {inside['monocypher']['version']}"
 
 
+def test_bill_of_materials_lists_the_vendored_javascript(bill: Any) -> None:
+    (one,) = [each for each in bill["components"] if each["name"] in VENDORED]
+    ((_, path),) = [each.values() for each in one["properties"]]
+    assert (CHECKOUT / path).is_file()
+    (row,) = [line for line in (CHECKOUT / path).with_name("README.md").read_text("utf-8").splitlines()
+              if f"`{Path(path).name}`" in line]  # fmt: skip
+    (digest,) = [each["content"] for each in one["hashes"]]
+    integrity = f"sha512-{b64encode(bytes.fromhex(digest)).decode()}"
+    licence = one["licenses"][0]["license"]["id"]
+    assert f"| {one['version']} | `{integrity}` | {licence}," in row
+    assert one["purl"] == f"pkg:npm/%40noble/ed25519@{one['version']}"
+
+
 def test_bill_of_materials_has_the_pinned_versions(bill: Any) -> None:
     text = (CHECKOUT / "requirements/dev.txt").read_text(encoding="utf-8").replace("\\\n", "")
     pins = [Requirement(line.split("--hash")[0]) for line in text.splitlines() if "==" in line]
@@ -145,9 +160,9 @@ def test_bill_of_materials_lists_exactly_the_dependencies(bill: Any) -> None:
     extras = {
         canonicalize_name(Requirement(e).name) for line in project["optional-dependencies"].values() for e in line
     }
-    assert edges["rtshcua"] == ((always | extras) - {"rtshcua"}) | COMPILED
+    assert edges["rtshcua"] == ((always | extras) - {"rtshcua"}) | COMPILED | VENDORED
     for name, below in edges.items():
-        if name not in {"rtshcua", *COMPILED}:
+        if name not in {"rtshcua", *COMPILED, *VENDORED}:
             lines = [Requirement(each) for each in metadata.requires(name) or ()]
             assert {canonicalize_name(each.name) for each in lines if applies(each)} <= below
 
@@ -160,4 +175,4 @@ def test_bill_of_materials_lists_exactly_the_dependencies(bill: Any) -> None:
 
     scopes = {each["name"]: each["scope"] for each in bill["components"]}
     assert scopes.keys() == reached(set(edges["rtshcua"]))
-    assert {name for name, scope in scopes.items() if scope == "required"} == reached(always) | COMPILED
+    assert {name for name, scope in scopes.items() if scope == "required"} == reached(always) | COMPILED | VENDORED

@@ -124,7 +124,7 @@ LOGS = st.lists(
 )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=settings().max_examples * 4)
 @given(LOGS, st.integers(-500, 9_000), st.integers(-900, 900), st.integers(-900, 900), st.integers(-20_000, 20_000))
 def test_one_point_against_a_naive_oracle(
     steps: list[tuple[int, int, int, int]], at_ms: int, x: int, y: int, z: int

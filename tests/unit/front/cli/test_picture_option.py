@@ -57,6 +57,13 @@ def test_refused_mission_is_drawn_too(at: Path, command: str, capsys: pytest.Cap
     assert not (at / "past.bundle").exists()
 
 
+def test_policy_without_a_mission_says_what_to_do(at: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (at / "policy.rts").write_text('import "lib:policies/bridge_inspection.rts"\n')
+    main(["check", "policy.rts", "--picture", "none.svg"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "0 missions drawn in none.svg: name a file with a mission, or draw the zones of a policy" in said
+
+
 def test_missions_stand_one_below_the_other(at: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", ".", "--picture", "all.svg", "--map", "all.html"]) == ExitCode.DIAGNOSTICS
     assert titles(at / "all.svg") == ["near: no errors", "past: refused"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Final
 
 from rtshcua.adapters.store.logs import START, lines
 from rtshcua.adapters.store.reading import open_regular
@@ -74,6 +75,25 @@ def report_code(report: LogReport) -> ExitCode:
     if report.failure is None:
         return ExitCode.OK if report.verdict is LogVerdict.VERIFIED else ExitCode.INCOMPLETE
     return finding_code(report.failure.slug)
+
+
+#: of exit codes for logs the worst first; any other code stands between both
+_EVIDENCE: Final = (ExitCode.ANCHOR, ExitCode.BOUNDARY, ExitCode.DECISION, ExitCode.EVIDENCE)
+_LEAST: Final = (ExitCode.INCOMPLETE, ExitCode.OK)
+
+
+def worst(codes: Iterable[ExitCode]) -> ExitCode:
+    """The worst of the exit codes of several logs: a log that fails verification, then one that could not be read or
+    written, then an incomplete one.
+    """
+    return min(codes, key=_severity, default=ExitCode.OK)
+
+
+def _severity(code: ExitCode) -> tuple[int, int]:
+    """A rank, the worst first; other codes by their number."""
+    if code in _EVIDENCE:
+        return 0, _EVIDENCE.index(code)
+    return (2, _LEAST.index(code)) if code in _LEAST else (1, code)
 
 
 def finding_code(slug: str) -> ExitCode:

@@ -9,18 +9,23 @@ from urllib.parse import quote
 
 from rtshcua.adapters.store.verification import Progress
 from rtshcua.adapters.store.writing import make_folder, replace_inside
+from rtshcua.app.documents import no_log
+from rtshcua.app.exit_codes import words_of
 from rtshcua.app.files import PAGES, overwriting_another
 from rtshcua.app.flights.flight_report import FlightReportRequest, ReportedFlight, flight_report
 from rtshcua.app.flights.redaction import Redaction
+from rtshcua.app.logs import NO_LOG_HELP, is_log
 from rtshcua.app.wording import utc
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.flight.flight_content import FlightReport
 from rtshcua.ground.flight.flight_page import page
-from rtshcua.ground.flight.logbook_page import LogbookEntry, logbook_page
+from rtshcua.ground.flight.logbook_page import LogbookEntry, UnreadLog, logbook_page
 
 _PAGE, _INDEX = ".html", "index.html"
 _A_PAGE: Final = "a page"
+#: in place of the reason in a redacted logbook, where a path could be a name
+_NOT_TOLD: Final = "a log could not be read; why is not told in a redacted logbook"
 
 
 class FlightPage(NamedTuple):
@@ -72,13 +77,17 @@ class Logbook:
         self._names = {Path(_INDEX).stem}
         self._entries: list[LogbookEntry] = []
         self._redactions: list[Redaction] = []
-        self._unread = 0
+        self._unread: list[UnreadLog] = []
 
     def add(self, log: Path, progress: Progress = lambda _: None) -> FlightPage | Refusal:
-        """Add the page of the next flight. Raises OSError."""
-        found = flight_report(self._request._replace(log=log), progress)
+        """Add the page of the next flight; if its files cannot be read, a row that says why. Raises OSError if the page
+        cannot be written.
+        """
+        found = self._reported(log, progress)
         if isinstance(found, Refusal):
-            self._unread += 1
+            redacted = bool(self._request.removed)
+            name, why = ("", _NOT_TOLD) if redacted else (_name(log, 0, redacted=False), found.text)
+            self._unread.append(UnreadLog(name, why))
             return found
         name = self._unlike(_name(log, len(self._entries) + 1, redacted=bool(self._request.removed))) + _PAGE
         file = None if self._folder is None else self._folder / name
@@ -89,6 +98,14 @@ class Logbook:
             self._entries.append(LogbookEntry(f"./{quote(name)}", made.report.without_log()))
             self._redactions += [] if found.redaction is None else [found.redaction]
         return made
+
+    def _reported(self, log: Path, progress: Progress) -> ReportedFlight | Refusal:
+        try:
+            if not is_log(log):
+                return Refusal("input", *no_log(log, log, NO_LOG_HELP), code=ExitCode.INPUT)
+            return flight_report(self._request._replace(log=log), progress)
+        except OSError as error:
+            return Refusal("input", f"`{log}` cannot be read: {words_of(error)}", NO_LOG_HELP, code=ExitCode.INPUT)
 
     def finish(self) -> Path | Refusal | None:
         """Write the index; return its file, None without a folder. Raises OSError."""
@@ -124,11 +141,13 @@ def _name(log: Path, number: int, *, redacted: bool) -> str:
 
 
 def _written(found: ReportedFlight, file: Path | None, tiles: str) -> FlightPage | Refusal:
-    gc.freeze()  # what is there stays until the end: looking through it again and again takes a third of the time
+    collecting = gc.isenabled()
+    gc.disable()  # what is there stays until the end: searching it again and again takes a third of the time
     try:
         text = page(found.report, tiles=tiles)
     finally:
-        gc.unfreeze()
+        if collecting:
+            gc.enable()
     left = None if found.redaction is None else found.redaction.left(text)
     if left is not None:
         return left

@@ -19,6 +19,13 @@ class LogbookEntry(NamedTuple):
     flight: FlightReport
 
 
+class UnreadLog(NamedTuple):
+    """A log of which no page could be made: its name, and why."""
+
+    name: str
+    why: str
+
+
 class LogbookTotals(NamedTuple):
     """The totals of a logbook: times in us, distances in mm over ground, of the flights with telemetry. A flight whose
     log failed counts in `flights` and `verdicts` alone.
@@ -48,8 +55,8 @@ def totals(flights: Sequence[FlightReport]) -> LogbookTotals:
     )
 
 
-def logbook_page(entries: Sequence[LogbookEntry], made_at: str, made_by: str, unread: int = 0) -> str:
-    """Render a logbook, the latest flight first; it says how many other logs could not be read."""
+def logbook_page(entries: Sequence[LogbookEntry], made_at: str, made_by: str, unread: Sequence[UnreadLog] = ()) -> str:
+    """Render a logbook, the latest flight first; each log that could not be read is a row that says why."""
     scripts = [script("sort.js")]
     ordered = sorted(entries, key=lambda each: each.flight.begun_utc_us, reverse=True)
     return rendered(

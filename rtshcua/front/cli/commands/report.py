@@ -15,7 +15,7 @@ from rtshcua.app.documents import no_log
 from rtshcua.app.flights.flight_report import FlightReportRequest
 from rtshcua.app.flights.redaction import REDACTABLE, redaction_of
 from rtshcua.app.flights.report_pages import FlightPage, Logbook, default_target, flight_page, target_of
-from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_meant
+from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_meant, worst
 from rtshcua.app.pin import trusted
 from rtshcua.app.wording import many, moment
 from rtshcua.diagnostics.exits import ExitCode
@@ -71,8 +71,9 @@ def report(
     which its reader's browser can verify under a key of the reader's. Several flights also get an index, a logbook.
 
     The log is verified first, as by `verify-log --audit`. A page is also made of a log that fails, and says so; the
-    exit code is that of `verify-log`: of several logs, the first that is not 0. With --redact the page is a picture and
-    no record.
+    exit code is that of `verify-log`. Of several logs it is the worst: 12, 15, 11, 9 for evidence that fails, then any
+    other code such as 3 for a log that could not be read, then 10, then 0. With --redact the page is a picture and no
+    record.
     """
     pinned = trusted(root)
     if isinstance(pinned, Refusal):
@@ -87,9 +88,8 @@ def report(
     if made_at is None:
         return fail(ExitCode.USAGE, f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
     logs = list({os.path.realpath(log): log for log in reversed(logs_meant(runs))}.values())[::-1]
-    for log in logs:
-        if not is_log(log):
-            return fail(ExitCode.INPUT, *no_log(log, log, NO_LOG_HELP))
+    if len(logs) == 1 and not is_log(logs[0]):
+        return fail(ExitCode.INPUT, *no_log(logs[0], logs[0], NO_LOG_HELP))
     request = FlightReportRequest(logs[0], pinned, tuple(sources or (Path(),)), made_at, removed)
     target = _target(output, logs, redacted=bool(removed), as_json=as_json)
     if isinstance(target, Refusal):
@@ -140,16 +140,15 @@ def _one(request: FlightReportRequest, target: Path | None, tiles: str, *, as_js
 def _several(
     logs: Sequence[Path], request: FlightReportRequest, folder: Path | None, tiles: str, *, as_json: bool
 ) -> ExitCode:
-    logbook, code, number = Logbook(folder, request, tiles), ExitCode.OK, 0
+    logbook, codes, number = Logbook(folder, request, tiles), list[ExitCode](), 0
     for log in logs:
-        with octets_of("verifying", log.stat().st_size) as progress:
+        with octets_of("verifying", log.stat().st_size if log.is_file() else 0) as progress:
             made = logbook.add(log, progress)
         if isinstance(made, Refusal):
-            refused = refuse(made)
-            code = code or refused
+            codes.append(refuse(made))
             continue
         number += 1
-        code = code or made.code
+        codes.append(made.code)
         if as_json:
             out_json(_line(made))
         else:
@@ -160,7 +159,7 @@ def _several(
         return refuse(index)
     if index is not None:
         say(f"{many(number, 'flight')}: open {index}")
-    return code
+    return worst(codes)
 
 
 def _line(made: FlightPage) -> str:

@@ -11,6 +11,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from rtshcua.app.logs import worst
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
 from virtual import flight_reports
@@ -234,7 +235,55 @@ def test_logbook_names_each_log_that_it_cannot_read(runs: Path, capsys: pytest.C
     told = capsys.readouterr().err
     assert all(f"`{name}/log.jsonl`" in told for name in ("cut", "short"))
     assert "1 flight: open book/index.html" in told
-    assert "2 more could not be read" in Path("book/index.html").read_text(encoding="utf-8")
+    page = Path("book/index.html").read_text(encoding="utf-8")
+    assert "2 more could not be read" in page
+    assert page.count('<td><span class="said failed">not read</span></td>') == 2
+    assert "cut: <code>cut/log.jsonl</code>: the log is cut inside its first record" in page
+
+
+def test_unreadable_entries_do_not_stop_the_logbook(runs: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder, a dangling link and a text in place of a log are rows, and the exit code tells it."""
+    shutil.copytree(runs / "a", here / "all" / "b-flight")
+    (here / "all" / "a-folder" / "log.jsonl").mkdir(parents=True)
+    for name in ("c-link", "d-text"):
+        (here / "all" / name).mkdir()
+    (here / "all" / "c-link" / "log.jsonl").symlink_to("nowhere")
+    (here / "all" / "d-text" / "log.jsonl").write_text("no log\n")
+    given = [str(here / "all" / name) for name in ("a-folder", "b-flight", "c-link", "d-text")]
+    assert main(["report", *given, "-o", "book", *ROOT]) == ExitCode.INPUT
+    page = Path("book/index.html").read_text(encoding="utf-8")
+    assert "3 more could not be read" in page
+    for name in ("a-folder", "c-link", "d-text"):
+        assert f'<td colspan="7">{name}: ' in page
+    assert 'href="./b-flight.html"' in page
+    assert "1 flight: open book/index.html" in capsys.readouterr().err
+    assert main(["report", *given, "-o", "picture", "--redact", "names", *ROOT]) == ExitCode.INPUT
+    assert "d-text" not in Path("picture/index.html").read_text(encoding="utf-8")
+
+
+def test_exit_code_of_a_logbook_is_the_worst(runs: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = (runs / "a" / "log.jsonl").read_bytes().splitlines(keepends=True)
+    for name, kept in (("cut", lines[:-1]), ("changed", [*lines[:9], lines[9].replace(b":1", b":2", 1), *lines[10:]])):
+        Path(name).mkdir()
+        Path(name, "log.jsonl").write_bytes(b"".join(kept))
+    assert main(["report", "cut", "changed", str(runs / "a"), "-o", "book", *ROOT]) == ExitCode.EVIDENCE
+    assert main(["report", "cut", str(runs / "a"), "-o", "book", *ROOT]) == ExitCode.INCOMPLETE
+
+
+@pytest.mark.parametrize(
+    ("codes", "expected"),
+    [
+        ([], ExitCode.OK),
+        ([ExitCode.OK, ExitCode.INCOMPLETE], ExitCode.INCOMPLETE),
+        ([ExitCode.INCOMPLETE, ExitCode.INPUT], ExitCode.INPUT),
+        ([ExitCode.INPUT, ExitCode.EVIDENCE, ExitCode.OK], ExitCode.EVIDENCE),
+        ([ExitCode.EVIDENCE, ExitCode.DECISION], ExitCode.DECISION),
+        ([ExitCode.DECISION, ExitCode.BOUNDARY, ExitCode.FULL], ExitCode.BOUNDARY),
+        ([ExitCode.BOUNDARY, ExitCode.ANCHOR], ExitCode.ANCHOR),
+    ],
+)
+def test_worst_code(codes: list[ExitCode], expected: ExitCode) -> None:
+    assert worst(codes) is worst(codes[::-1]) is expected
 
 
 def test_telemetry_that_was_removed_is_told_as_missing(

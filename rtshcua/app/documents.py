@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from msgspec.structs import replace
 
 from rtshcua.adapters.store.reading import open_regular, read_regular
-from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, EMPTY, LOG, LOOKED_AT, FileKind, recognised
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
@@ -31,16 +31,37 @@ class Claimed(NamedTuple):
     mission_kid: bytes
 
 
+class PreparedBundle(NamedTuple):
+    """An unverified bundle, and its policy and mission as they are prepared on board."""
+
+    said: Claimed
+    policy: PreparedPolicy
+    invocations: tuple[PreparedInvocation, ...]
+
+
 def claimed(data: bytes, *, trusted: bool = False) -> Claimed:
     """Parse a bundle without verifying it; a very large one only if it is `trusted`. Raises `Untrusted`."""
+    return claimed_and_prepared(data, trusted=trusted).said
+
+
+def claimed_and_prepared(data: bytes, *, trusted: bool = False) -> PreparedBundle:
+    """As `claimed`, with what is prepared of it."""
     first, second = (cose.unverified(envelope) for envelope in envelopes(data))
     read = parse if trusted else parse_unverified
     policy, mission = read(names.POLICY, first.payload, Policy), read(names.MISSION, second.payload, Mission)
     prepared = prepare(policy)
-    checked = prepared if isinstance(prepared, Refusal) else prepare_mission(mission, prepared)
-    if isinstance(checked, Refusal):
-        raise Untrusted("malformed", f"the bundle is inconsistent: {checked.text}")
-    return Claimed(policy, mission, digest(BUNDLE_DIGEST, data), policy_digest(first.payload), first.kid, second.kid)
+    if isinstance(prepared, Refusal):
+        raise _inconsistent(prepared)
+    invocations = prepare_mission(mission, prepared)
+    if isinstance(invocations, Refusal):
+        raise _inconsistent(invocations)
+    of_policy = policy_digest(first.payload)
+    said = Claimed(policy, mission, digest(BUNDLE_DIGEST, data), of_policy, first.kid, second.kid)
+    return PreparedBundle(said, prepared, invocations)
+
+
+def _inconsistent(refusal: Refusal) -> Untrusted:
+    return Untrusted("malformed", f"the bundle is inconsistent: {refusal.text}")
 
 
 def recorded_replacement(detail: str) -> ReplacementDocument:

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from rtshcua.app.documents import claimed, over, recorded_replacement
+from rtshcua.app.documents import PreparedBundle, claimed_and_prepared, over, recorded_replacement
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_mission
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
@@ -26,11 +26,16 @@ class Subject(NamedTuple):
 def unpacked(data: bytes, name: str) -> Subject | Refusal:
     """Return the prepared mission of a bundle; a refusal if it is not a bundle."""
     try:
-        bundle = claimed(data)
+        bundle = claimed_and_prepared(data)
     except Untrusted as error:
         help = "accepted: a source (.rts, .json), a bundle, a log or a run's folder"
         return Refusal(error.slug, f"{name}: {error}", help)
-    return prepared(bundle.policy, bundle.mission)
+    return subject_of(bundle)
+
+
+def subject_of(bundle: PreparedBundle) -> Subject:
+    """Return the mission of a bundle that was prepared when it was read."""
+    return Subject(bundle.policy, bundle.said.mission, bundle.invocations)
 
 
 def prepared(policy: Policy, mission: Mission) -> Subject | Refusal:

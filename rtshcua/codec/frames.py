@@ -219,7 +219,7 @@ class Codec:
 
         A frame does not span datagrams, so nothing is kept between calls. The time is for the verifier.
         """
-        received, only = _decode(datagram), self._only  # a datagram usually contains one frame
+        received, only = decode(datagram), self._only  # a datagram usually contains one frame
         if received is not None:
             heeded = self._verifier is None and (only is None or received[2] in only)
             return [received] if heeded or self._lets_in(received, now_us) else []
@@ -228,7 +228,7 @@ class Codec:
         in_garbage = False
         while start < octets:
             end = _frame_end(datagram, start)
-            received = _decode(datagram[start:end]) if end else None
+            received = decode(datagram[start:end]) if end else None
             if received is not None:
                 if self._lets_in(received, now_us):
                     good.append(received)
@@ -255,7 +255,7 @@ class Codec:
         return False
 
 
-def _decode(frame: bytes) -> ReceivedFrame | None:
+def decode(frame: bytes) -> ReceivedFrame | None:
     """The valid frame in these octets, signed or not; None for anything else."""
     octets = len(frame)
     if octets < _LEAST or frame[0] != MARKER:

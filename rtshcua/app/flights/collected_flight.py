@@ -11,7 +11,7 @@ from rtshcua.app.flights.decisions_told import DecisionWords
 from rtshcua.app.flights.flight_reading import FlightRecords, telemetry_of
 from rtshcua.app.flights.flight_telemetry import TelemetryReading, thinning_of
 from rtshcua.app.logged_decision import LoggedDecision
-from rtshcua.app.prepared_mission import Subject, prepared
+from rtshcua.app.prepared_mission import Subject, subject_of
 from rtshcua.app.telling.documents_told import said
 from rtshcua.app.telling.people import People
 from rtshcua.app.telling.records_told import Names
@@ -78,10 +78,9 @@ class CollectedFlight:
         return self.names
 
     def _subject_of(self, _: Genesis) -> Subject | Refusal:
-        bundle = self.records.bundle
-        if isinstance(bundle, Claimed):
-            return prepared(bundle.policy, bundle.mission)
-        return Refusal("genesis/bundle", f"the bundle in `{self.log}` cannot be read: {bundle}")
+        if self.records.prepared is not None:
+            return subject_of(self.records.prepared)
+        return Refusal("genesis/bundle", f"the bundle in `{self.log}` cannot be read: {self.records.bundle}")
 
     def take(self, record: AnyRecord) -> None:
         """Take the next valid record."""

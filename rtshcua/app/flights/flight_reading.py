@@ -10,7 +10,7 @@ from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import TELEMETRY
 from rtshcua.adapters.vehicle.telemetry import Telemetry, UnknownSource
-from rtshcua.app.documents import Claimed, claimed, replaced
+from rtshcua.app.documents import Claimed, PreparedBundle, claimed_and_prepared, replaced
 from rtshcua.app.flights.flight_telemetry import read_telemetry
 from rtshcua.app.logs import CUT_AT_FIRST
 from rtshcua.app.sidecar_files import run_folder
@@ -33,6 +33,8 @@ class FlightRecords:
         self.genesis: Genesis | None = None
         #: the bundle in the first record, or why it cannot be read
         self.bundle: Claimed | Untrusted | None = None
+        #: the same as it is prepared on board; None if it cannot be read
+        self.prepared: PreparedBundle | None = None
         self._mission: Mission | None = None
         self._steps: list[Invocation] = []  # all that were ever in force
         self._records: list[AnyRecord] = []
@@ -43,7 +45,8 @@ class FlightRecords:
         if isinstance(record, Genesis):
             self.genesis = record
             try:
-                self.bundle = _readable(claimed(b64decode(record.bundle)))
+                self.prepared = _readable(claimed_and_prepared(b64decode(record.bundle)))
+                self.bundle = self.prepared.said
                 self._mission = self.bundle.mission
                 self._steps += self._mission.invocations
             except ValueError as error:  # `Untrusted` too
@@ -75,10 +78,10 @@ class FlightRecords:
         )
 
 
-def _readable(bundle: Claimed) -> Claimed:
+def _readable(bundle: PreparedBundle) -> PreparedBundle:
     """A bundle whose signals this program can read. Raises `Untrusted`."""
     try:
-        Telemetry(bundle.policy)
+        Telemetry(bundle.said.policy)
     except UnknownSource as error:
         raise Untrusted("malformed", str(error)) from None
     return bundle

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.app.sidecar_files import SENDER_AND_NUMBER
-from rtshcua.codec.frames import Codec, ReceivedFrame, kind_of
+from rtshcua.codec.frames import ReceivedFrame, decode, kind_of
 from rtshcua.ground.audit.frames import OURS
 from rtshcua.ground.flight.flown import (
     ClockJump,
@@ -146,7 +146,6 @@ class TelemetryReading:
 
     def __init__(self, policy: Policy, begun_utc_us: int, thinning: Thinning) -> None:
         self._begun_us, self._thinning, self._policy = begun_utc_us, thinning, policy
-        self._codec = Codec(0, 0)
         self._signals = {each.slot: each for each in policy.signals if each.kind != POSITION}
         self._needed = {name for sources in Telemetry(policy).sources for name in sources}
         #: frames that need not be taken, by the sender and the number of the message
@@ -194,7 +193,7 @@ class TelemetryReading:
         system, key, number = frame[_SYSTEM], frame[SENDER_AND_NUMBER], int.from_bytes(frame[_NUMBER], "little")
         of = kind_of(number)
         if of is not None and frame[_COMPONENT] == OURS:
-            if self._parsed(frame) is None:
+            if decode(frame) is None:
                 return None  # damaged: anybody may have sent it
             self._companions[system] = self._companions.get(system, False) or number != HEARTBEAT
         if of is None or frame[_COMPONENT] != AUTOPILOT or not (number in _READ or of.name in self._needed):
@@ -207,13 +206,8 @@ class TelemetryReading:
         vehicle.kinds.append(kind)
         return kind
 
-    def _parsed(self, frame: bytes) -> ReceivedFrame | None:
-        """A frame; None if it is damaged, even if the octets of another one lie within it."""
-        found = self._codec.parse(frame)
-        return found[0] if found and found[0].frame == frame else None
-
     def _decode(self, at_us: int, frame: bytes, kind: _Kind) -> None:
-        found = self._parsed(frame)
+        found = decode(frame)
         if found is None:
             return
         every_us = self._thinning.position_us if kind.number in _OF_PLACE else self._thinning.others_us

@@ -6,6 +6,7 @@ Only this package uses floats: they say where on the page something is drawn, an
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import isqrt
+from typing import NamedTuple
 
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.ground.drawing.drawn_site import ZoneOutline
@@ -149,8 +150,7 @@ _CIRCLE = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class LabelBox:
+class LabelBox(NamedTuple):
     """A rectangle on the page."""
 
     x: float
@@ -158,14 +158,14 @@ class LabelBox:
     width: float
     height: float
 
-    def meets(self, other: "LabelBox") -> bool:
-        """Whether both overlap or are nearer than the gap."""
-        return (
-            self.x < other.x + other.width + GAP
-            and other.x < self.x + self.width + GAP
-            and self.y < other.y + other.height + GAP
-            and other.y < self.y + self.height + GAP
-        )
+    def meets_any(self, others: Sequence["LabelBox"]) -> bool:
+        """Whether it overlaps one of the others, or is nearer to it than the gap."""
+        left, top = self.x - GAP, self.y - GAP  # written out, as labels are tried at many places
+        right, bottom = self.x + self.width + GAP, self.y + self.height + GAP
+        for other in others:
+            if other.x < right and left < other.x + other.width and other.y < bottom and top < other.y + other.height:
+                return True
+        return False
 
     def is_on_page(self, width: float, height: float) -> bool:
         """Whether a part of it is on a page of this size."""
@@ -231,7 +231,7 @@ class Labels:
         for kept, strict in (((*self.taken, *avoid), True), ((*self.taken, *avoid), False), (self.taken, False)):
             for x, y in _around(*anchor):
                 box = LabelBox(x - width / 2, y - LINE / 2, width, LINE)
-                if not self._fits(box) or any(box.meets(other) for other in kept):
+                if not self._fits(box) or box.meets_any(kept):
                     continue
                 if strict and own is not None and len({own(*point) for point in box.points()}) > 1:
                     continue

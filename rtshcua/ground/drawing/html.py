@@ -56,6 +56,7 @@ def templates(package: str) -> tuple[Environment, str]:
     environment = Environment(
         loader=DictLoader(texts),
         autoescape=True,
+        optimized=False,  # most templates are rendered once: optimising takes longer than it saves
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -67,8 +68,11 @@ def templates(package: str) -> tuple[Environment, str]:
 
 def _told(text: str, anchors: dict[str, str] | None = None) -> Markup:
     """Convert a sentence to HTML: names become code, with links to their explanations."""
+    text = _UNIT.sub("\u00a0", text)
+    if "`" not in text:
+        return escape(text)
     parts = []
-    for number_, part in enumerate(_UNIT.sub("\u00a0", text).split("`")):
+    for number_, part in enumerate(text.split("`")):
         if number_ % 2 == 0:
             parts.append(escape(part))
             continue

@@ -480,7 +480,9 @@ def boxes_along(*lines: Sequence[tuple[float, float]]) -> tuple[LabelBox, ...]:
             count = int(max(abs(bx - ax), abs(by - ay)) / 6) + 1
             for part in range(count + 1):
                 x, y = ax + (bx - ax) * part / count, ay + (by - ay) * part / count
-                found.setdefault((int(x / 3), int(y / 3)), LabelBox(x - 2, y - 2, 4, 4))
+                cell = int(x / 3), int(y / 3)
+                if cell not in found:
+                    found[cell] = LabelBox(x - 2, y - 2, 4, 4)
     return tuple(found.values())
 
 

@@ -154,7 +154,7 @@ def test_labels_do_not_overlap() -> None:
     site = Site("p", many, (0, 0), 5_000, 30_000, 400_000)
     for profile in (planned_heights(site, WAY), flown_heights(site, FLOWN), planned_heights(SITE, WAY)):
         boxes = [label.box for label in profile.labels]
-        assert not [pair for pair in combinations(boxes, 2) if pair[0].meets(pair[1])]
+        assert not [pair for pair in combinations(boxes, 2) if pair[0].meets_any(pair[1:])]
         assert all(box.x > 0 and box.x + box.width < profile.width for box in boxes)
         assert len(profile.labels) + len(profile.unlabelled) >= len({band.title for band in profile.bands})
 

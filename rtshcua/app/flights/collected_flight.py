@@ -62,10 +62,15 @@ class CollectedFlight:
             self._begin_telemetry(self.records.genesis)
         return path is not None and self._reading is not None and self._reading.follow(path)
 
-    def flight(self) -> Flight | Refusal:
-        """The flight so far."""
-        heard = None if self._reading is None else self._reading.telemetry(self.records.times.lasted_us)
-        return self.records.flight(self.log, heard)
+    def flight(self, *, growing: bool = False) -> Flight | Refusal:
+        """The flight so far. The telemetry ends with the log, except of a `growing` log, whose next record is still to
+        come.
+        """
+        if self._reading is None:
+            return self.records.flight(self.log, None)
+        lasted_us = self.records.times.lasted_us
+        heard = self._reading.telemetry(lasted_us)
+        return self.records.flight(self.log, heard if growing else heard.until(lasted_us))
 
     @property
     def persons(self) -> tuple[str, ...]:

@@ -121,7 +121,7 @@ class LiveFlight:
 
     def report(self, made_at_us: int) -> FlightReport | Refusal:
         """The content of the page so far."""
-        flight = self._collected.flight()
+        flight = self._collected.flight(growing=not self.closed)
         if isinstance(flight, Refusal):
             return flight
         return flight_told(None, flight, self._collected, made_at_us=made_at_us, pinned="no key")

@@ -275,7 +275,7 @@ class TelemetryReading:
         return FlightTelemetry(
             told.reports, track, told.home(), signals, _in_order(told.texts, span), _silences(runs, span, lasted_us),
             _in_order(told.boot, span), self._damaged, tuple(each.system for each in candidates[1:] and candidates),
-            steps, len(told.track) - len(track),
+            steps, len(told.track) - len(track), _ended(runs, span),
         )  # fmt: skip
 
     def _candidates(self) -> list[_Vehicle]:
@@ -314,6 +314,11 @@ def _steps(runs: Sequence[tuple[int, int]], lasted_us: int | None) -> tuple[Cloc
     most_us = -_NEVER if lasted_us is None else max(lasted_us, FORWARD_US)
     between = [(one[1], other[0] - one[1]) for one, other in pairwise(runs)]
     return tuple(ClockJump(after_us, by_us) for after_us, by_us in between if by_us < 0 or by_us > most_us)
+
+
+def _ended(runs: Sequence[tuple[int, int]], span: tuple[int, int] | None) -> int:
+    """The time of the last frame within a span."""
+    return max((b if span is None else min(b, span[1]) for a, b in runs if span is None or a <= span[1]), default=0)
 
 
 def _silences(

@@ -10,9 +10,15 @@ from rtshcua.ground.flight.flown import FlightTelemetry
 #: the most silences and steps of the clock that are told
 _MOST: Final = 20
 
+#: telemetry after the last record is told from this on, us
+_LATER_US: Final = 100_000
+
 
 def doubts(telemetry: FlightTelemetry) -> Iterator[str]:
     """Yield what makes it doubtful whose the telemetry is, and of which time."""
+    if telemetry.later_us >= _LATER_US:
+        later = seconds(telemetry.later_us)
+        yield f"it has {later} after the last record of the log, which are neither drawn nor counted"
     if telemetry.vehicles:
         systems, told = listed(map(str, telemetry.vehicles)), telemetry.vehicles[0]
         yield f"it has vehicles with the system ids {systems}; which one was commanded is not known, this is `{told}`"

@@ -1,6 +1,7 @@
 """The content of a flight's report: six lines that answer a customer's questions, from the log alone."""
 
 import json
+import re
 from base64 import b64encode
 from pathlib import Path
 
@@ -138,6 +139,46 @@ def test_log_without_end_is_incomplete(completed: Path, tmp_path: Path) -> None:
     assert (report.verdict, report.ending, code) == ("incomplete", "not closed", ExitCode.INCOMPLETE)
     assert report.track is None
     assert {"telemetry", "witnesses"} <= {each.what for each in report.gaps}
+
+
+def test_telemetry_after_the_last_record_is_neither_drawn_nor_counted(completed: Path, tmp_path: Path) -> None:
+    """The log was cut before the vehicle flew on to its highest place; the telemetry goes on to the landing."""
+    whole = report_of(completed).report
+    assert whole.track is not None
+    assert not [each for each in whole.gaps if "after the last record" in each.told]
+    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
+    began = next(number for number, line in enumerate(lines) if b'"event":"dispatched"' in line)
+    (tmp_path / "log.jsonl").write_bytes(b"".join(lines[: began + 3]))
+    (tmp_path / "telemetry.tlog").write_bytes((completed / "telemetry.tlog").read_bytes())
+    report = report_of(tmp_path).report
+    assert report.track is not None
+    assert 0 < len(report.track.points) < len(whole.track.points) / 2
+    assert all(each.t_us <= report.lasted_us for each in report.track.points)
+    assert all(t_us <= report.lasted_us for each in report.signals for t_us, _ in each.series.points)
+    assert report.highest is not None
+    assert whole.highest is not None
+    assert report.highest < whole.highest
+    assert report.distance is not None
+    assert whole.distance is not None
+    assert report.distance < whole.distance
+    (told,) = [each.told for each in report.gaps if "after the last record" in each.told]
+    found = re.search(r"it has ([0-9.]+) s after", told)
+    assert found is not None
+    ended_us = max(each.t_us for each in whole.track.points)
+    assert abs(float(found[1]) * 1_000_000 - (ended_us - report.lasted_us)) < 1_500_000
+
+
+def test_growing_flight_is_drawn_beyond_its_last_record(completed: Path, tmp_path: Path) -> None:
+    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "log.jsonl").write_bytes(b"".join(lines[: len(lines) // 2]))
+    (tmp_path / "telemetry.tlog").write_bytes((completed / "telemetry.tlog").read_bytes())
+    live = LiveFlight(tmp_path / "log.jsonl", ())
+    live.update()
+    report = live.report(MADE_US)
+    assert not isinstance(report, Refusal)
+    assert report.track is not None
+    assert report.track.points[-1].t_us > report.lasted_us
+    assert not [each for each in report.gaps if "after the last record" in each.told]
 
 
 @pytest.mark.parametrize("data", [b"", b'{"_prev":"', b"{}\n", b"\xff\xfe garbage\n"])

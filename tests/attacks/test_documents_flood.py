@@ -23,7 +23,7 @@ from reference.world import MISSION_KEY, ROOT, START, VEHICLE, Run, loaded, seal
 from rtshcua.adapters.agent_socket import GAP_US, SHORT, WORK_AT_ONCE, WORK_RATE, AgentSocket, Encoded
 from rtshcua.app.fly import agents
 from rtshcua.app.fly.agents import Agents
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.enforcement.isolated import PART, PRESENT, Caller
@@ -36,7 +36,7 @@ from rtshcua.wire.cose import MAX_PROTECTED, EnvelopeError
 
 #: functions whose time grows with the document: never called in the flight's thread
 LONG: list[tuple[Any, str]] = [
-    (Commands, "_of_step"), (response, "own_clauses"), (words, "call"), (Encoded, "decoded"), (agents, "b64encode"),
+    (Commands, "_of_step"), (response, "own_clauses"), (prose, "call"), (Encoded, "decoded"), (agents, "b64encode"),
     (runtime, "b64encode"),
 ]  # fmt: skip
 #: CBOR items that one turn may decode in the flight's thread: about 0.1 ms

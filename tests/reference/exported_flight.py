@@ -14,7 +14,7 @@ from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.flights import flight_export as service
 from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.ground.flight.export.exported import FlightExport, ToldRecord, with_usable_track
+from rtshcua.ground.flight.export.exported import ExportedRecord, FlightExport, with_usable_track
 from rtshcua.ground.flight.flown import Flight, FlightTelemetry, GeoPlace, TrackPoint
 from rtshcua.mavlink import tlog
 from rtshcua.model.flat.zone import meridian
@@ -93,9 +93,9 @@ def moved(export: FlightExport, north: int, east: int) -> FlightExport:
     return export._replace(flight=flight._replace(policy=policy, telemetry=there))
 
 
-def told(words: str, t_us: int = 1_000_000, **fields: Any) -> ToldRecord:
+def told(words: str, t_us: int = 1_000_000, **fields: Any) -> ExportedRecord:
     """A decision in these words."""
-    return ToldRecord(t_us, True, "allow", "admitted", 0, words)._replace(**fields)
+    return ExportedRecord(t_us, True, "allow", "admitted", 0, words)._replace(**fields)
 
 
 def by_pymavlink(path: Path, *names: str) -> list[Any]:

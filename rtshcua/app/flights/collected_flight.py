@@ -7,14 +7,14 @@ from typing import Final
 
 from rtshcua.app.documents import Claimed
 from rtshcua.app.flights.clause_places import ClausePlaces
-from rtshcua.app.flights.decisions_told import DecisionWords
+from rtshcua.app.flights.decision_views import DecisionViews
 from rtshcua.app.flights.flight_reading import FlightRecords, telemetry_of
 from rtshcua.app.flights.flight_telemetry import TelemetryReading, thinning_of
 from rtshcua.app.logged_decision import LoggedDecision
 from rtshcua.app.prepared_mission import Subject, subject_of
-from rtshcua.app.telling.documents_told import said
+from rtshcua.app.telling.document_prose import said
 from rtshcua.app.telling.people import People
-from rtshcua.app.telling.records_told import Names
+from rtshcua.app.telling.record_prose import Names
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis
@@ -35,7 +35,7 @@ class CollectedFlight:
         self.records = FlightRecords()
         self.cause = LoggedDecision(log, None, self._names_of, self._subject_of)
         self.names: Names | None = None
-        self.decisions: DecisionWords | None = None
+        self.decisions: DecisionViews | None = None
         self.told: list[ListedRecord] = []
         #: what is wrong with the line at which a growing log breaks off; empty while nothing is
         self.flaw = ""
@@ -96,7 +96,7 @@ class CollectedFlight:
             subject = self.cause.in_force
             if subject is not None and self.names is not None:
                 places = ClausePlaces(subject.policy.policy, subject.mission, self._sources)
-                self.decisions = DecisionWords(subject, self.names, places)
+                self.decisions = DecisionViews(subject, self.names, places)
         elif isinstance(record, DecisionRecord | Effect) and self.decisions is not None:
             self.decisions.take(record, t_us)
         if isinstance(record, Effect) and record.event == "approval":
@@ -111,7 +111,7 @@ class CollectedFlight:
         assert isinstance(self.records.bundle, Claimed)
         return self.records.bundle.mission
 
-    def decisions_told(self) -> tuple[DecisionView, ...]:
+    def decision_views(self) -> tuple[DecisionView, ...]:
         """The decisions in words."""
         return () if self.decisions is None else self.decisions.views
 

@@ -11,10 +11,10 @@ from rtshcua.adapters.store.runs import LOG, TELEMETRY
 from rtshcua.adapters.store.writing import write_out
 from rtshcua.app.documents import kind_of, no_log
 from rtshcua.app.flights.flight_reading import read_flight
-from rtshcua.app.flights.telemetry_told import doubts
+from rtshcua.app.flights.telemetry_prose import doubts
 from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of
 from rtshcua.app.pin import trusted
-from rtshcua.app.telling.records_told import Names
+from rtshcua.app.telling.record_prose import Names
 from rtshcua.app.verify_log import VerifyRequest, verify_log
 from rtshcua.app.wording import many
 from rtshcua.decision.prepare import prepare, prepare_mission
@@ -28,7 +28,7 @@ from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import DecisionRecord, Effect, Genesis
 from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.flight.export import CSV, FORMATS, GEOJSON, GPX, KML, MCAP, PLAN, TLOG
-from rtshcua.ground.flight.export.exported import FlightExport, ToldRecord, with_usable_track
+from rtshcua.ground.flight.export.exported import ExportedRecord, FlightExport, with_usable_track
 from rtshcua.ground.flight.flown import Flight, FlightTelemetry
 from rtshcua.ground.flight.track import home_of
 from rtshcua.wire.request import STEP
@@ -188,7 +188,7 @@ def _status(log: Path) -> LogStatus:
     return LogStatus(LogVerdict.FAILED, f"not verified: {flaw.slug} at record {flaw.record}: {flaw.text}")
 
 
-def _told(log: Path, flight: Flight) -> tuple[ToldRecord, ...]:
+def _told(log: Path, flight: Flight) -> tuple[ExportedRecord, ...]:
     """The decisions and events in words; statements of the boundary are left out."""
     with open_regular(log) as file:
         first = read(next(lines(file), b""))
@@ -201,12 +201,12 @@ def _told(log: Path, flight: Flight) -> tuple[ToldRecord, ...]:
     return tuple(told)
 
 
-def _told_record(record: DecisionRecord | Effect, flight: Flight, names: Names) -> ToldRecord:
+def _told_record(record: DecisionRecord | Effect, flight: Flight, names: Names) -> ExportedRecord:
     words = " ".join(names.tell(record).removeprefix("· ").split())
     t_us, step = flight.since_begun(record), record.step if record.kind >= STEP else -1
     if isinstance(record, DecisionRecord):
-        return ToldRecord(t_us, True, record.outcome, record.reason, step, words)
-    return ToldRecord(t_us, False, record.event, "", step, words)
+        return ExportedRecord(t_us, True, record.outcome, record.reason, step, words)
+    return ExportedRecord(t_us, False, record.event, "", step, words)
 
 
 def _made(format: str, exported: FlightExport, log: Path) -> _Made | Refusal:

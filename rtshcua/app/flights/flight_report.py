@@ -10,7 +10,7 @@ from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.verification import Progress
 from rtshcua.app.autopilot_bindings import roots_of, trusted_bindings
 from rtshcua.app.flights.collected_flight import CollectedFlight
-from rtshcua.app.flights.flight_told import flight_told
+from rtshcua.app.flights.flight_view import flight_view
 from rtshcua.app.flights.redaction import Redaction, bare_flight, bare_report, may_stay
 from rtshcua.app.logs import report_code
 from rtshcua.app.pin import Pin
@@ -62,7 +62,7 @@ def flight_report(request: FlightReportRequest, progress: Progress = lambda _: N
         redaction = Redaction(flight, collected.persons, request.removed, (collected.mission(),))
         found, flight = bare_report(found), bare_flight(flight)
     roots = roots_of(None if audit.basis is None else audit.basis.root, request.pin.roots)
-    told = flight_told(
+    told = flight_view(
         found, flight, collected, trusted_bindings(audit.report, request.log, roots),
         made_at_us=request.made_at_us, pinned=f"root key `{request.pin.key.hex()}`", details=not request.removed,
     )  # fmt: skip
@@ -124,4 +124,4 @@ class LiveFlight:
         flight = self._collected.flight(growing=not self.closed)
         if isinstance(flight, Refusal):
             return flight
-        return flight_told(None, flight, self._collected, made_at_us=made_at_us, pinned="no key")
+        return flight_view(None, flight, self._collected, made_at_us=made_at_us, pinned="no key")

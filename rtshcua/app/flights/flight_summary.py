@@ -7,7 +7,7 @@ from typing import Final
 
 from rtshcua.app.documents import Claimed
 from rtshcua.app.flights.collected_flight import CollectedFlight
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.app.wording import many, seconds
 from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect
 from rtshcua.evidence.report import LogReport, LogVerdict
@@ -89,13 +89,13 @@ class FlightSummary:
         first, last, policy = self._collected.mission(), self._flight.mission, self._flight.policy
         steps = last.invocations
         whose = dict.fromkeys(
-            f"for role `{policy.roles[each.role]}` through {words.source(each.source)}"
+            f"for role `{policy.roles[each.role]}` through {prose.source(each.source)}"
             for each in steps
             if 0 <= each.role < len(policy.roles)
         )
         intent = f" (“{first.intent}”)" if first.intent and self._details else ""
         by = f", proposed by `{first.proposer}`" if first.proposer else ""
-        told = _listed([f"`{words.call(policy, each)}`" for each in steps], ", ")
+        told = _listed([f"`{prose.call(policy, each)}`" for each in steps], ", ")
         newer = len(list(self._effects("replacement")))
         after = f" The steps are those after {many(newer, 'replacement')}." if newer else ""
         return f"Mission `{first.name}`{intent}{by} {' and '.join(whose)}: {many(len(steps), 'step')}, {told}.{after}"
@@ -141,12 +141,10 @@ class FlightSummary:
 
     def _flew(self) -> str:
         steps = len(self._flight.mission.invocations)
-        lasted_us = self._flight.lasted_us
-        told = (
-            f"{len(self.done)} of {many(steps, 'step')} completed in {words.duration(lasted_us // 100_000 * 100_000)}"
-        )
+        lasted = prose.duration(self._flight.lasted_us // 100_000 * 100_000)
+        told = f"{len(self.done)} of {many(steps, 'step')} completed in {lasted}"
         if not any(self._effects("dispatched")):
-            told = f"Nothing: no command was sent to the vehicle in {words.duration(lasted_us // 100_000 * 100_000)}"
+            told = f"Nothing: no command was sent to the vehicle in {lasted}"
         if self._flight.telemetry is None and self._flight.names_telemetry:
             return f"{told}. The telemetry that the log names is missing, so its way is not known."
         if self._track is None:
@@ -217,7 +215,7 @@ class FlightSummary:
 
     def _denied(self, record: DecisionRecord) -> str:
         subject = self._names.subject(record.kind, record.step, record.link)
-        views = self._collected.decisions_told()
+        views = self._collected.decision_views()
         view = next((each for each in views if each.seq <= record.seq and each.subject == subject
                      and each.reason == record.reason), None)  # fmt: skip
         told = f"{subject} was not allowed"

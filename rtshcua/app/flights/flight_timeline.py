@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from rtshcua.app.telling.records_told import Names
+from rtshcua.app.telling.record_prose import Names
 from rtshcua.evidence.records import DecisionRecord, Effect
 from rtshcua.ground.flight.flight_content import TimelineEvent
 from rtshcua.ground.flight.flown import Flight

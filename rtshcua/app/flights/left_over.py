@@ -31,10 +31,10 @@ _LEAST: Final = 3
 _SCRIPTS: Final = ("cursor.js", "growing.js", "tiles.js", "sort.js")
 #: the modules whose sentences a page has
 _TELLING: Final = (
-    "rtshcua.app.flights.flight_told", "rtshcua.app.flights.decisions_told", "rtshcua.app.flights.redaction",
-    "rtshcua.app.flights.flight_summary", "rtshcua.app.flights.flight_timeline", "rtshcua.app.flights.telemetry_told",
+    "rtshcua.app.flights.flight_view", "rtshcua.app.flights.decision_views", "rtshcua.app.flights.redaction",
+    "rtshcua.app.flights.flight_summary", "rtshcua.app.flights.flight_timeline", "rtshcua.app.flights.telemetry_prose",
     "rtshcua.app.flights.collected_flight", "rtshcua.app.autopilot_bindings",
-    "rtshcua.app.flights.flight_report", "rtshcua.app.telling.records_told", "rtshcua.app.telling.words",
+    "rtshcua.app.flights.flight_report", "rtshcua.app.telling.record_prose", "rtshcua.app.telling.prose",
     "rtshcua.app.wording", "rtshcua.model.step_number", "rtshcua.model.quantity", "rtshcua.evidence.report",
     "rtshcua.evidence.gaps", "rtshcua.evidence.attested", "rtshcua.ground.audit.audit", "rtshcua.app.sidecar_files",
     "rtshcua.app.verify_log", "rtshcua.ground.flight.flight_page", "rtshcua.ground.flight.logbook_page",

@@ -10,7 +10,7 @@ import msgspec
 
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.exit_codes import code_of
-from rtshcua.app.telling.records_told import detail_of
+from rtshcua.app.telling.record_prose import detail_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import faults

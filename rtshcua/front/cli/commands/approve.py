@@ -7,7 +7,7 @@ import typer
 
 from rtshcua.app.approvals import ApprovalDraft, ApprovalRequest, ApprovalSigner, draft_approval, sign_draft
 from rtshcua.app.flight_documents import MOST_S
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.app.wording import shorten
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -99,7 +99,7 @@ def approve(
 
 def _tell(draft: ApprovalDraft, step: int) -> str:
     """Print what is signed; return the step in words."""
-    told = words.step(draft.bundle.policy, draft.step)
+    told = prose.step(draft.bundle.policy, draft.step)
     # chosen by the proposer: it must not push the rest out of sight
     mission = shorten(draft.bundle.mission.name, NAME_SHOWN)
     say(f"step {step} of `{mission}` on `{draft.document.vehicle}`: `{told}`")
@@ -112,8 +112,8 @@ def _tell(draft: ApprovalDraft, step: int) -> str:
 def _other(planned: PlannedPath) -> str:
     if not planned.points:
         return "the planner finds none there"
-    apart = f"up to {words.length(planned.apart)} from the mission's path"
-    return f"the planner's path has {planned.points} points, is {words.length(planned.length)} long, and lies {apart}"
+    apart = f"up to {prose.length(planned.apart)} from the mission's path"
+    return f"the planner's path has {planned.points} points, is {prose.length(planned.length)} long, and lies {apart}"
 
 
 def _answer(refused: bool) -> str:

@@ -19,7 +19,7 @@ from rtshcua.app.exit_codes import untrusted
 from rtshcua.app.flight_documents import MOST_S, bundle_in_flight
 from rtshcua.app.fly.narrator import REPLACED, Answering, asks
 from rtshcua.app.recalls import Recalled
-from rtshcua.app.telling.records_told import Names
+from rtshcua.app.telling.record_prose import Names
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest

@@ -19,7 +19,7 @@ DEGREES, METRES, HEADING, SECONDS = 7, 3, 2, 6
 NO_TIME: Final = 2**64 // 1_000
 
 
-class ToldRecord(NamedTuple):
+class ExportedRecord(NamedTuple):
     """A decision or an event of the log in words. `name` is the outcome of a decision, or the slug of an event; `step`
     is a step index, -1 for none.
     """
@@ -49,13 +49,13 @@ class FlightExport(NamedTuple):
     """
 
     flight: Flight
-    told: tuple[ToldRecord, ...]
+    told: tuple[ExportedRecord, ...]
     made_by: str
     verified: bool
     log_status: str
 
     @property
-    def decisions(self) -> tuple[ToldRecord, ...]:
+    def decisions(self) -> tuple[ExportedRecord, ...]:
         """The decisions among the records."""
         return tuple(each for each in self.told if each.is_decision)
 

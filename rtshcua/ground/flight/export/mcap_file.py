@@ -15,8 +15,8 @@ from rtshcua.ground.flight.export.exported import (
     DEGREES,
     HEADING,
     METRES,
+    ExportedRecord,
     FlightExport,
-    ToldRecord,
     number,
     shown,
 )
@@ -216,7 +216,7 @@ def _state(point: TrackPoint) -> dict[str, object]:
     return found
 
 
-def _record(each: ToldRecord) -> dict[str, object]:
+def _record(each: ExportedRecord) -> dict[str, object]:
     step = {"step_number": each.step_number or 0}
     if each.is_decision:
         return step | {"outcome": shown(each.name), "reason": shown(each.reason), "words": shown(each.words)}

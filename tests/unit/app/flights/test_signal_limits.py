@@ -4,7 +4,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.flat_case import apply, clause, const, signal
-from rtshcua.app.flights.flight_told import signal_limits
+from rtshcua.app.flights.flight_view import signal_limits
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.policy import Policy, RuleKind
 

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from reference import flat_case as flat
 from rtshcua.app.flights.flight_telemetry import Thinning, read_telemetry
-from rtshcua.app.flights.telemetry_told import doubts, silences
+from rtshcua.app.flights.telemetry_prose import doubts, silences
 from rtshcua.ground.flight.flown import ClockJump, FlightTelemetry, GeoPlace, TelemetrySilence
 from rtshcua.mavlink import tlog
 from rtshcua.model.flat.signal import SignalSource

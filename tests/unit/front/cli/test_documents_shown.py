@@ -13,7 +13,7 @@ from reference.forgery import edit
 from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT_KEY, TICK, FakeVehicle, Run
 from rtshcua.app.fly.narrator import NOTHING_FLIES, Teller
 from rtshcua.app.fly.story import Summary
-from rtshcua.app.telling.records_told import Names, detail_of
+from rtshcua.app.telling.record_prose import Names, detail_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read

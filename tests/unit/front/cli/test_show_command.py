@@ -14,8 +14,8 @@ from reference.forgery import edit, flight, other_flight, read
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import write_new
-from rtshcua.app.telling import words
-from rtshcua.app.telling.records_told import detail_of
+from rtshcua.app.telling import prose
+from rtshcua.app.telling.record_prose import detail_of
 from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -270,7 +270,7 @@ def test_envelopes_of_other_kinds_are_not_shown_as_roots(bundle: Path, tmp_path:
 
 def test_out_of_range_values_are_described() -> None:
     choice = Parameter("pattern", CHOICE, "", 0, 0, 1, ("grid", "orbit"))
-    assert words.arguments(case.policy(), (choice,), (7,)) == "pattern = 7, out of range"
+    assert prose.arguments(case.policy(), (choice,), (7,)) == "pattern = 7, out of range"
 
 
 @pytest.mark.parametrize(
@@ -292,11 +292,11 @@ def test_a_temporal_monitor(kind: int, window_us: int, text: str) -> None:
 
 
 def test_words_of_places_and_zones() -> None:
-    assert words.geographic(-473_977_400, 5) == "47.39774 S, 0.0000005 E"
-    assert words.geographic(0, -1_800_000_000) == "0.0 N, 180.0 W"
+    assert prose.geographic(-473_977_400, 5) == "47.39774 S, 0.0000005 E"
+    assert prose.geographic(0, -1_800_000_000) == "0.0 N, 180.0 W"
     round_zone = Zone("z", CIRCLE, 0, 60_000, (0, 0, 80_000**2))
-    assert words.zone(case.policy(), round_zone).startswith("circle of 80 m around ")
-    assert words.zone(case.policy(), round_zone).endswith("; floor 0 m, ceiling 60 m above home")
+    assert prose.zone(case.policy(), round_zone).startswith("circle of 80 m around ")
+    assert prose.zone(case.policy(), round_zone).endswith("; floor 0 m, ceiling 60 m above home")
 
 
 def test_pages_wrap_beneath_themselves() -> None:

@@ -1,6 +1,6 @@
 """A signed document for a flight under way, in words: who says what about which step. Nothing is verified here."""
 
-from rtshcua.app.telling.documents_told import body_told, said
+from rtshcua.app.telling.document_prose import body_told, said
 from rtshcua.app.wording import utc
 from rtshcua.front.cli.render.showing.page import TextPage, named
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter

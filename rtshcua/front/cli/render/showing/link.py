@@ -1,6 +1,6 @@
 """A decision on a link on a page: what it needed, what else might have flown, and the state that was recorded."""
 
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.evidence.records import DecisionRecord
 from rtshcua.front.cli.render.showing.page import TextPage
@@ -22,7 +22,7 @@ def show_link(
     if found.rule is not None:
         whose = f"the degrade rule `{' '.join(found.rule.text.split())}`"
     page.head(f"{found.link.link.text}, of {whose}: {record.outcome}, {record.reason}")
-    page.row("flies", words.link(policy, found.link.link))
+    page.row("flies", prose.link(policy, found.link.link))
     page.row("asked for", "its skill's `require`, and that it does not lead further out of the airspace")
     for check in found.checks:
         text = "" if check.clause is None else " ".join(check.clause.text.split())
@@ -57,11 +57,11 @@ def _reading(policy: Policy, signal: Signal, state: State) -> str:
     width = 2 if signal.kind == POSITION else 1
     values = [value for value in state.values[signal.slot : signal.slot + width] if value is not None]
     age_us = max(state.ages[signal.slot : signal.slot + width])
-    stale = f", {words.duration(age_us)} old: stale" if age_us > signal.stale_us else ""
+    stale = f", {prose.duration(age_us)} old: stale" if age_us > signal.stale_us else ""
     if len(values) < width:
         return "unknown"
     if signal.kind == POSITION:
-        return words.place(policy, values[0], values[1]) + stale
+        return prose.place(policy, values[0], values[1]) + stale
     if signal.kind == ENUMERATION:
         return dict(signal.labels).get(values[0], str(values[0])) + stale
-    return words.quantity(values[0], signal.dimension) + stale
+    return prose.quantity(values[0], signal.dimension) + stale

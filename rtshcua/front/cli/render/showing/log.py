@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import msgspec
 
 from rtshcua.adapters.boundary.optee import DEVELOPMENT
-from rtshcua.app.telling.records_told import Names, bundle_of
+from rtshcua.app.telling.record_prose import Names, bundle_of
 from rtshcua.app.wording import true_to, utc
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from rtshcua.adapters.loop import WAIT_US
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.app.wording import utc
 from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.model.flat.code import Clause
@@ -19,7 +19,7 @@ _NOTHING = "nothing"
 
 def show_contract(page: TextPage, policy: Policy, contract: Contract) -> None:
     """Adds a contract to the page."""
-    parameters = [words.parameter(policy, parameter) for parameter in contract.parameters]
+    parameters = [prose.parameter(policy, parameter) for parameter in contract.parameters]
     page.text(f"{contract.name}({'' if parameters else ')'}")
     for parameter in parameters:
         page.text(parameter + ",", indent=6)
@@ -32,25 +32,25 @@ def show_contract(page: TextPage, policy: Policy, contract: Contract) -> None:
 def fields(policy: Policy, contract: Contract) -> list[tuple[str, str]]:
     """The fields but for the parameters, by the words of the language; a name is empty where it goes on."""
     during = f" during {', '.join(contract.phases)}" if contract.phases else ", in any phase"
-    chain = [f"{n} {words.link(policy, link)}" for n, link in enumerate(contract.fallback)]
+    chain = [f"{n} {prose.link(policy, link)}" for n, link in enumerate(contract.fallback)]
     left_out = [
         f"{clause.part} {clause.text}: the vehicle is without a sensor for it"
         for clause in policy.left_out
         if clause.skill >= 0 and policy.contracts[clause.skill].name == contract.name
     ]
     return [
-        ("motion", words.motion(contract)),
+        ("motion", prose.motion(contract)),
         ("class", TimingClass(contract.timing_class).name.lower()),
-        ("deadline", f"{words.duration(contract.deadline_us)} after release"),
-        ("valid", f"for {words.duration(contract.validity_us)} after issue{during}"),
-        ("lasts", f"at most {words.duration(contract.duration_us)}"),
-        ("grace", f"{words.duration(contract.grace_us)}: how long a signal may be unknown while the step runs"),
+        ("deadline", f"{prose.duration(contract.deadline_us)} after release"),
+        ("valid", f"for {prose.duration(contract.validity_us)} after issue{during}"),
+        ("lasts", f"at most {prose.duration(contract.duration_us)}"),
+        ("grace", f"{prose.duration(contract.grace_us)}: how long a signal may be unknown while the step runs"),
         *_list("require", _texts(contract.require)),
         *_list("assume", _texts(contract.assume)),
         *_list("maintain", _texts(contract.maintain)),
         *(_list("left out", left_out) if left_out else ()),
         *_list("fallback", chain),
-        ("energy", f"at most {words.ratio(contract.energy)}"),
+        ("energy", f"at most {prose.ratio(contract.energy)}"),
         ("record", ", ".join(contract.record) or _NOTHING),
     ]
 
@@ -89,9 +89,9 @@ def show_policy(page: TextPage, policy: Policy) -> None:
     if policy.monitors:
         page.head("Temporal monitors: what conditions of the past look at")
         for number, monitor in enumerate(policy.monitors):
-            page.row(str(number), words.monitor(monitor), width=2)
+            page.row(str(number), prose.monitor(monitor), width=2)
     for title, named in (
-        ("Zones", [(zone.name, words.zone(policy, zone)) for zone in policy.zones]),
+        ("Zones", [(zone.name, prose.zone(policy, zone)) for zone in policy.zones]),
         ("Signals", [(signal.name, _signal(signal)) for signal in policy.signals]),
     ):
         page.head(title)
@@ -107,20 +107,23 @@ def _of_vehicle(policy: Policy) -> Iterator[tuple[str, str]]:
     """The vehicle, by the words of the page."""
     vehicle, projection = policy.vehicle, policy.projection
     yield "vehicle", f"`{vehicle.identity}`, declared as {vehicle.name}"
-    home = words.geographic(projection.latitude, projection.longitude)
-    yield "home", f"{home}, within {words.length(vehicle.home_within)}"
-    yield "moves", f"at most {words.speed(vehicle.speed)}, climbs at most {words.speed(vehicle.climb)}"
+    home = prose.geographic(projection.latitude, projection.longitude)
+    yield "home", f"{home}, within {prose.length(vehicle.home_within)}"
+    yield "moves", f"at most {prose.speed(vehicle.speed)}, climbs at most {prose.speed(vehicle.climb)}"
     if vehicle.speeds is not None:
-        kept, wind = vehicle.speeds, words.speed(vehicle.speeds.wind)
-        up, down = words.speed(kept.climb), words.speed(kept.descent)
-        yield "keeps", f"at least {words.speed(kept.cruise)}, {up} up, {down} down, in at most {wind} of wind"
+        kept, wind = vehicle.speeds, prose.speed(vehicle.speeds.wind)
+        up, down = prose.speed(kept.climb), prose.speed(kept.descent)
+        yield "keeps", f"at least {prose.speed(kept.cruise)}, {up} up, {down} down, in at most {wind} of wind"
     if vehicle.return_altitude:
-        yield "returns", f"at {words.length(vehicle.return_altitude)} above home, if it flies lower"
+        yield "returns", f"at {prose.length(vehicle.return_altitude)} above home, if it flies lower"
     if vehicle.braking:
-        braking, reaction = words.speed(vehicle.braking), words.duration(vehicle.reaction_us)
+        braking, reaction = prose.speed(vehicle.braking), prose.duration(vehicle.reaction_us)
         yield "brakes", f"by {braking} in a second, after {reaction}: limits apply at the point where it would stop"
-    yield "position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this error"
-    hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
+    yield (
+        "position",
+        f"true to {prose.length(vehicle.position_error)}: every planned path is widened by this error",
+    )
+    hover, reserve = prose.duration(vehicle.endurance_us), prose.ratio(vehicle.reserve)
     yield "energy", f"a full battery hovers {hover}; {reserve} stay in reserve"
     if vehicle.without:
         yield "without", f"{', '.join(vehicle.without)}: not fitted; what reads it `where fitted` is left out"
@@ -133,18 +136,18 @@ def _show_rules(page: TextPage, policy: Policy) -> None:
     for number, rule in enumerate(policy.rules):
         page.row(str(number), rule.text, width=2)
         if rule.target is not None:
-            page.row("", f"flies {words.link(policy, rule.target)}", width=2)
+            page.row("", f"flies {prose.link(policy, rule.target)}", width=2)
     rules_left_out = [each.text for each in policy.left_out if each.skill < 0]
     if rules_left_out:
         page.rows("left out", [f"{text}: the vehicle is without a sensor for it" for text in rules_left_out])
     page.row("airspace", "anywhere" if policy.airspace is None else policy.airspace.text.removeprefix("airspace "))
-    page.rows("contingency", [f"{n} {words.link(policy, link)}" for n, link in enumerate(policy.contingency)])
+    page.rows("contingency", [f"{n} {prose.link(policy, link)}" for n, link in enumerate(policy.contingency)])
     if policy.contingency and all(0 <= link.skill < len(policy.contracts) for link in policy.contingency):
-        most = words.duration(-(-falling_us(policy, None, Limits(), WAIT_US) // _MINUTE_US) * _MINUTE_US)
+        most = prose.duration(-(-falling_us(policy, None, Limits(), WAIT_US) // _MINUTE_US) * _MINUTE_US)
         page.row("", f"at most {most} until the vehicle is on the ground, or the last attempt has failed")
     page.row("without", _WITHOUT_EVIDENCE.get(policy.without_evidence, f"evidence: {policy.without_evidence}?"))
     then = _AFTER_SILENCE.get(policy.after_silence, f"{policy.after_silence}?")
-    page.row("without", f"link for {words.duration(policy.silence_us)} {then}")
+    page.row("without", f"link for {prose.duration(policy.silence_us)} {then}")
 
 
 def _source(source: SignalSource) -> str:
@@ -155,7 +158,7 @@ def _source(source: SignalSource) -> str:
 def _signal(signal: Signal) -> str:
     sources = [_source(source) for source in signal.sources]
     unknown = sorted({value for source in signal.sources for value in source.unknown})
-    parts = [f"{signal.dimension} from {' or '.join(sources)}", f"stale after {words.duration(signal.stale_us)}"]
+    parts = [f"{signal.dimension} from {' or '.join(sources)}", f"stale after {prose.duration(signal.stale_us)}"]
     if unknown:
         parts.append(f"unknown where it is {', '.join(map(str, unknown))}")
     return "; ".join(parts)
@@ -181,12 +184,12 @@ def show_mission(page: TextPage, mission: Mission, policy: Policy) -> None:
 def _show_step(page: TextPage, step: Invocation, mission: Mission, policy: Policy) -> None:
     contract = step.contract
     page.text(
-        f"{number_of(step.step):>2} {contract.name}({words.arguments(policy, contract.parameters, step.arguments)})"
+        f"{number_of(step.step):>2} {contract.name}({prose.arguments(policy, contract.parameters, step.arguments)})"
     )
     phases = [name for number, name in enumerate(mission.phases) if step.phases >> number & 1]
     rows = [
-        ("asked by", f"role {policy.roles[step.role]} through {words.source(step.source)}"),
-        ("goes", words.plan(policy, step.plan)),
+        ("asked by", f"role {policy.roles[step.role]} through {prose.source(step.source)}"),
+        ("goes", prose.plan(policy, step.plan)),
         ("valid", f"until {utc(step.issued_at_us + contract.validity_us)}, during {', '.join(phases)}"),
         ("otherwise", f"{OnInadmissible(step.on_inadmissible).name.lower()}, when it is not admitted in the air"),
         ("id", step.invocation_id.hex()),

@@ -7,9 +7,9 @@ import msgspec
 
 from rtshcua.app.documents import claimed
 from rtshcua.app.fly.simulated_flight import SIMULATED
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.app.telling.people import NOBODY, People
-from rtshcua.app.telling.records_told import Names, detail_of
+from rtshcua.app.telling.record_prose import Names, detail_of
 from rtshcua.app.wording import true_to, utc
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Sealing, Signed
 from rtshcua.evidence.report import LogReport, LogVerdict
@@ -161,11 +161,11 @@ def _signal(policy: Policy, signal: Signal, record: DecisionRecord) -> str:
     if value is None or other is None:
         known = "unknown"
     elif signal.kind == POSITION:
-        known = words.place(policy, value, other)
+        known = prose.place(policy, value, other)
     elif signal.kind == ENUMERATION:
         known = dict(signal.labels).get(value, str(value))
     else:
-        known = words.quantity(value, signal.dimension)
+        known = prose.quantity(value, signal.dimension)
     return f"{signal.name} = {known}, {_age(record.state.ages[signal.slot])}"
 
 

@@ -3,7 +3,7 @@
 import msgspec
 
 from rtshcua.app.fly.dry_run import FlightRehearsal
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.render.showing.page import TextPage, for_terminal
 from rtshcua.front.cli.stdout import out_json, out_rendered
@@ -34,10 +34,10 @@ def _page(rehearsal: FlightRehearsal) -> TextPage:
     for each in found:
         invocation, decision = mission.invocations[each.step], each.decision
         outcome = decision.outcome.name.lower()
-        called = words.call(loaded.bundle.policy, invocation)
+        called = prose.call(loaded.bundle.policy, invocation)
         page.text(f"{number_of(each.step):>3}  {outcome:<8}  {mission.phases[invocation.phase]:<12}  {called}")
         if decision.outcome is not Outcome.ALLOW:
-            quoted = words.quoted(loaded.bundle.policy, invocation, decision.clause)
+            quoted = prose.quoted(loaded.bundle.policy, invocation, decision.clause)
             clause = f": {quoted}" if quoted else ""
             page.row("because", f"{decision.reason.value}{clause}", indent=7, width=10)
             if each.observing:
@@ -47,7 +47,7 @@ def _page(rehearsal: FlightRehearsal) -> TextPage:
                     indent=7,
                     width=10,
                 )
-            page.rows("would pass", [words.would_pass(one) for one in each.nearest], indent=7, width=10)
+            page.rows("would pass", [prose.would_pass(one) for one in each.nearest], indent=7, width=10)
     page.text("")
     waits = sum(each.hopeful and each.decision.outcome is not Outcome.ALLOW for each in found)
     admitted = sum(each.decision.outcome is Outcome.ALLOW for each in found)
@@ -68,7 +68,7 @@ def _object(rehearsal: FlightRehearsal) -> dict[str, object]:
                 "step": each.step,
                 "step_number": number_of(each.step),
                 "phase": mission.phases[invocation.phase],
-                "text": words.call(loaded.bundle.policy, invocation),
+                "text": prose.call(loaded.bundle.policy, invocation),
                 "outcome": decision.outcome.name.lower(),
                 "reason": decision.reason.value,
                 "clause": None if decision.clause is None else decision.clause.text,

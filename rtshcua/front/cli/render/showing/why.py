@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from rtshcua.app.prepared_mission import Subject
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.app.telling.people import NOBODY, People
 from rtshcua.app.why import AssumedCase, decide_assumed
 from rtshcua.app.wording import utc
@@ -62,12 +62,12 @@ def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:
     decision = trace.decision
     page.head(f"{_subject(policy, invocation)}: {decision.outcome.name.lower()}, {decision.reason.value}")
     if decision.clause is not None:
-        page.row("because", words.quoted(policy, flat, decision.clause))
+        page.row("because", prose.quoted(policy, flat, decision.clause))
         page.row("written", f"{_place(policy, decision.clause)}")
     if decision.outcome is Outcome.FALLBACK:
         page.row("flies", _flies(decision.target, case.aloft))
     for nearest in trace.nearest:
-        page.row("would pass", words.would_pass(nearest))
+        page.row("would pass", prose.would_pass(nearest))
     page.head("Step by step")
     steps = [_step(page, step, case, decision.clause) for step in trace.steps]
     if trace.chain and decision.outcome is Outcome.FALLBACK:
@@ -90,7 +90,7 @@ def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:
             {
                 "subject": each.subject,
                 "value": each.value,
-                "words": words.nearest_value(each),
+                "words": prose.nearest_value(each),
                 "choices": list(each.choices),
             }
             for each in trace.nearest
@@ -110,7 +110,7 @@ def _flies(target: Link | None, aloft: bool | None) -> str:
 
 def _subject(policy: Policy, invocation: PreparedInvocation) -> str:
     flat = invocation.invocation
-    arguments = words.arguments(policy, flat.contract.parameters, flat.arguments)
+    arguments = prose.arguments(policy, flat.contract.parameters, flat.arguments)
     return f"Step {number_of(flat.step)}, {flat.contract.name}({arguments})"
 
 
@@ -131,7 +131,7 @@ def _step(page: TextPage, step: TracedStep, case: Case, decisive: Decisive) -> d
         mark = ">" if check.clause is decisive and decisive is not None else " "
         text = "the charge to finish and to come home" if check.clause is None else _text(check.clause)
         values = ", ".join(_read(invocation, each) for each in read)
-        told = words.quoted(invocation.policy.policy, invocation.invocation, check.clause) or f"`{text}`"
+        told = prose.quoted(invocation.policy.policy, invocation.invocation, check.clause) or f"`{text}`"
         words_of = f"{truth_of(check)}: {told}" + (f"   with {values}" if values else "")
         page.row(f"{mark} {check.role}", words_of, indent=5, width=10)
         checks.append({"role": check.role, "clause": text, "truth": truth_of(check), "reads": _for_program(read)})
@@ -150,7 +150,7 @@ def _fact(number: str, case: Case) -> str:
             end = utc(flat.issued_at_us + contract.validity_us)
             return f"issued {utc(flat.issued_at_us)}, valid until {end}, now {utc(now.utc_us)}; {used}"
         case "3":
-            return f"role {policy.roles[flat.role]} through {words.source(flat.source)}"
+            return f"role {policy.roles[flat.role]} through {prose.source(flat.source)}"
         case "3b":
             return "; ".join(dict.fromkeys(_answer(policy, each, now, case.people) for each in context.approvals))
         case "4":
@@ -160,7 +160,7 @@ def _fact(number: str, case: Case) -> str:
         case "5":
             waited = _milliseconds(max(now.monotonic_us - context.released_us, 0))
             return (
-                f"released {waited} ago, deadline {words.duration(contract.deadline_us)}, "
+                f"released {waited} ago, deadline {prose.duration(contract.deadline_us)}, "
                 f"sent at most {_milliseconds(context.remaining_us)} from now"
             )
         case _:
@@ -169,7 +169,7 @@ def _fact(number: str, case: Case) -> str:
 
 def _milliseconds(us: int) -> str:
     """A measured time, rounded up to what a person can use."""
-    return words.duration(-(-us // 1_000) * 1_000) if us else "0 ms"
+    return prose.duration(-(-us // 1_000) * 1_000) if us else "0 ms"
 
 
 def _answer(policy: Policy, given: ConfirmAnswer, now: Now, people: People) -> str:
@@ -205,8 +205,8 @@ def _read(invocation: PreparedInvocation, read: ReadValue) -> str:
     if read.signal is None:
         contract = invocation.invocation.contract
         named = [parameter for parameter in contract.parameters if parameter.name == read.name]
-        return words.arguments(policy, named, invocation.invocation.arguments)
-    return f"{read.name} = {words.read_value(policy, read)}"
+        return prose.arguments(policy, named, invocation.invocation.arguments)
+    return f"{read.name} = {prose.read_value(policy, read)}"
 
 
 def _for_program(read: list[ReadValue]) -> list[dict[str, object]]:

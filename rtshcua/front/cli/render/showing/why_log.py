@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from rtshcua.app.logged_decision import LoggedDecision, RecordLine, StepExplained, explained, read_decision
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.app.telling.people import People
-from rtshcua.app.telling.records_told import Names
+from rtshcua.app.telling.record_prose import Names
 from rtshcua.app.wording import utc
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.refusal import Refusal
@@ -106,7 +106,7 @@ def show_link(
     if found.rule is not None:
         whose = f"the degrade rule `{' '.join(found.rule.text.split())}`"
     page.head(f"{found.link.link.text}, of {whose}: {record.outcome}, {record.reason}")
-    page.row("flies", words.link(policy, found.link.link))
+    page.row("flies", prose.link(policy, found.link.link))
     page.row("asked for", "its skill's `require`, and that it does not lead further out of the airspace")
     for check in found.checks:
         text = "" if check.clause is None else " ".join(check.clause.text.split())
@@ -141,11 +141,11 @@ def _reading(policy: Policy, signal: Signal, state: State) -> str:
     width = 2 if signal.kind == POSITION else 1
     values = [value for value in state.values[signal.slot : signal.slot + width] if value is not None]
     age_us = max(state.ages[signal.slot : signal.slot + width])
-    stale = f", {words.duration(age_us)} old: stale" if age_us > signal.stale_us else ""
+    stale = f", {prose.duration(age_us)} old: stale" if age_us > signal.stale_us else ""
     if len(values) < width:
         return "unknown"
     if signal.kind == POSITION:
-        return words.place(policy, values[0], values[1]) + stale
+        return prose.place(policy, values[0], values[1]) + stale
     if signal.kind == ENUMERATION:
         return dict(signal.labels).get(values[0], str(values[0])) + stale
-    return words.quantity(values[0], signal.dimension) + stale
+    return prose.quantity(values[0], signal.dimension) + stale

@@ -9,7 +9,7 @@ from rtshcua.app.autopilot_bindings import agreed, apart, described
 from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.flights.flight_summary import FlightSummary
 from rtshcua.app.flights.flight_timeline import timeline
-from rtshcua.app.flights.telemetry_told import doubts, silences
+from rtshcua.app.flights.telemetry_prose import doubts, silences
 from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import many, seconds, true_to, utc
 from rtshcua.decision.tree import AtMost, Both, CodeScope, Either, Negation, Node, parse, scope_of
@@ -35,7 +35,7 @@ from rtshcua.model.flat.signal import POSITION
 from rtshcua.wire.autopilot_binding import AutopilotBinding
 
 
-def flight_told(
+def flight_view(
     report: LogReport | None, flight: Flight, collected: CollectedFlight, bindings: Sequence[AutopilotBinding] = (), *,
     made_at_us: int, pinned: str, details: bool = True,
 ) -> FlightReport:  # fmt: skip
@@ -71,7 +71,7 @@ def flight_told(
         track=track,
         bound=tuple(map(_bound, bindings)) if details else (),
         timeline=timeline(flight, collected.mission(), collected.names, details=details),
-        decisions=tuple(each._replace(where=_where(flight, track, each.t_us)) for each in collected.decisions_told()),
+        decisions=tuple(each._replace(where=_where(flight, track, each.t_us)) for each in collected.decision_views()),
         signals=_signals(flight),
         gaps=(*_gaps_of_log(flight, report), *_gaps_of_telemetry(flight), *collected.gaps()),
         proven=_texts(() if report is None else report.proven),

@@ -7,8 +7,8 @@ from contextlib import suppress
 
 from rtshcua.adapters.utc import CLOCK
 from rtshcua.app.documents import Claimed, claimed, replaced
-from rtshcua.app.telling import words
-from rtshcua.app.telling.documents_told import recorded
+from rtshcua.app.telling import prose
+from rtshcua.app.telling.document_prose import recorded
 from rtshcua.app.telling.people import NOBODY, People
 from rtshcua.app.wording import many
 from rtshcua.evidence.finding import Flaw
@@ -47,7 +47,7 @@ def detail_of(event: str, detail: str, people: People = NOBODY) -> str:
     if event == BOUNDARY:
         return _stated(detail)
     if event in _TIMED:
-        return _US.sub(lambda found: found[1] + words.duration(int(found[2])), detail)
+        return _US.sub(lambda found: found[1] + prose.duration(int(found[2])), detail)
     return f"the same decision {detail} more times" if event == "repeated" else detail
 
 
@@ -139,7 +139,7 @@ class Names:
             own = (*of.contract.require, *of.contract.assume, *of.contract.maintain)
             clause = next((each for each in own if each.text == record.clause), None)
             if clause is not None and 0 <= of.skill < len(policy.contracts):
-                return words.quoted(policy, of, clause)
+                return prose.quoted(policy, of, clause)
         return f"`{record.clause}`"
 
     def subject(self, kind: int, step: int, link: int) -> str:
@@ -180,4 +180,4 @@ class Names:
             chain = self._chain(kind, step)
             return chain[link].text if 0 <= link < len(chain) else ""
         steps = self._bundle.mission.invocations
-        return words.call(self._bundle.policy, steps[step]) if 0 <= step < len(steps) else ""
+        return prose.call(self._bundle.policy, steps[step]) if 0 <= step < len(steps) else ""

@@ -7,9 +7,9 @@ from rtshcua.app.documents import recorded_replacement
 from rtshcua.app.flights.clause_places import ClausePlaces
 from rtshcua.app.logged_decision import LinkExplained, StepExplained, explained
 from rtshcua.app.prepared_mission import Subject, after
-from rtshcua.app.telling import words
+from rtshcua.app.telling import prose
 from rtshcua.app.telling.people import People
-from rtshcua.app.telling.records_told import Names
+from rtshcua.app.telling.record_prose import Names
 from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.records import DecisionRecord, Effect
@@ -30,7 +30,7 @@ MOST_EXPLAINED: Final = 300
 _MOST_READ: Final = 20
 
 
-class DecisionWords:
+class DecisionViews:
     """Collects the decisions of a log; equal ones in a row, such as those while a step waits, are one."""
 
     def __init__(self, subject: Subject, names: Names, places: ClausePlaces) -> None:
@@ -102,9 +102,9 @@ class DecisionWords:
         decisive = trace.decision.clause
         checked: list[Decisive] = [each.clause for step in trace.steps for each in step.checks]
         view = view._replace(
-            clause=words.quoted(self._policy, flat, decisive) or view.clause,
+            clause=prose.quoted(self._policy, flat, decisive) or view.clause,
             reads=self._reads(record, [decisive] if decisive is not None else checked, flat.contract, flat.arguments),
-            would_pass=tuple(map(words.would_pass, trace.nearest)),
+            would_pass=tuple(map(prose.would_pass, trace.nearest)),
         )
         permit = _permit(found)
         return view if permit is None else self._because(view, record, permit)
@@ -113,7 +113,7 @@ class DecisionWords:
         """A decision on a link: the `degrade` rule whose target it is, or else what its skill requires."""
         trace, link = found.trace, found.trace.link.link
         view = view._replace(
-            flies=words.link(self._policy, link),
+            flies=prose.link(self._policy, link),
             chain=tuple(f"{each.text}: {'may fly' if each.admissible else 'may not'}" for each in trace.chain),
         )
         if trace.rule is not None and found.of is not None:
@@ -140,7 +140,7 @@ class DecisionWords:
             for read in read_values(clause, self._policy, contract, arguments, state):
                 if read.signal is not None:
                     age = max(state.ages[slot] for slot in read.signal.slots)
-                    told.setdefault(read.name, ReadSignal(read.name, words.read_value(self._policy, read), age))
+                    told.setdefault(read.name, ReadSignal(read.name, prose.read_value(self._policy, read), age))
                 else:
                     parameter = next(each for each in contract.parameters if each.name == read.name)
                     value = argument(self._policy, parameter, arguments)

@@ -1,5 +1,5 @@
 """A flight in six lines: what was asked, who allowed it, what flew, how it ended, whether the record is intact, and
-what nothing vouches for.
+what is not proven.
 """
 
 from collections.abc import Iterator, Sequence
@@ -74,7 +74,7 @@ class FlightSummary:
             SummaryLine("What flew", self._flew()),
             SummaryLine("How it ended, and why", self._ended()),
             SummaryLine("Is this record intact", self._intact()),
-            SummaryLine("What nothing vouches for", self._unvouched()),
+            SummaryLine("What is not proven", self._unproven()),
         )
 
     @property
@@ -241,9 +241,9 @@ class FlightSummary:
         again = "every decision was computed again, with the same result"
         return f"Yes: {many(report.records, 'record')}, signed and closed; {again}."
 
-    def _unvouched(self) -> str:
+    def _unproven(self) -> str:
         if self._report is None:
-            return "Anything on this page: nobody verified what it shows."
+            return "Everything on this page: the log was not verified."
         told = [claim.text for claim in self._report.unproven]
         if not told:
             return "Nothing is left open."

@@ -65,8 +65,8 @@ def redact(lines: Iterable[bytes], may_stay: Callable[[bytes], bool], *, checkpo
     `checkpoints`: also the checkpoints of all signed records. They show that the leaves are those of a signed log; they
     name the vehicle, the flight and its keys.
 
-    A leaf hides its line only from a reader who cannot guess it: whoever can list the lines that may have stood there
-    finds the right one by hashing them.
+    A leaf hides its line only from a reader who cannot guess it: one who can list the possible lines finds the right
+    one by hashing them.
     """
     tree = MerkleTree()
     leaves: list[str] = []

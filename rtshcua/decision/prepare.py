@@ -6,7 +6,7 @@ before.
 """
 
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -136,6 +136,7 @@ class Compiler:
         self._policy = policy
         self._scope = scope_of(policy)
         self._conditions: dict[int, Condition] = {}
+        self._whens: dict[int, tuple[Rule, Node | None]] = {}
         self._requires: dict[int, Guards] = {}
         self._guards: dict[tuple[Clause, ...], Guards | None] = {
             clauses: None for of in policy.contracts for clauses in (of.require, of.assume, of.maintain)
@@ -175,10 +176,13 @@ class Compiler:
         return found
 
     def when(self, rule: Rule) -> Node | None:
-        """The tree of a rule's condition, if it has one."""
-        if rule.when is None:
-            return None
-        return self.node(rule.when, *(self._policy.contracts[skill] for skill in rule.skills))
+        """The tree of a rule's condition, if it has one, made on first use."""
+        known = self._whens.get(id(rule))
+        if known is None or known[0] is not rule:
+            contracts = self._policy.contracts
+            node = None if rule.when is None else self.node(rule.when, *(contracts[skill] for skill in rule.skills))
+            known = self._whens[id(rule)] = rule, node
+        return known[1]
 
     def condition(self, rule: Rule, number: int) -> Condition:
         """The condition of a rule, compiled on first use."""
@@ -266,8 +270,9 @@ class PreparedPolicy:
     """A policy that was checked and compiled. `limits` has one entry for each slot; `bounds` is the same by column:
     the stale ages, the least and the greatest values. `monitors` are in order.
 
-    `seen` caches the last single situation, as planners cache their last start and zones their last box. No answer
-    depends on it, and nothing else in a prepared policy ever changes.
+    `seen` caches the last single situation, as planners cache their last start and zones their last box; `settled` what
+    invocations of one contract and the same rules have in common, by skill, role and source. No answer depends on them,
+    and nothing else in a prepared policy ever changes.
     """
 
     policy: Policy
@@ -281,6 +286,20 @@ class PreparedPolicy:
     still: Planner  # plans without motion: the present place with its error
     monitors: tuple[PreparedMonitor, ...]
     seen: SeenSituation | None = None
+    settled: "dict[tuple[int, int, int], tuple[Contract, SettledParts]]" = field(default_factory=dict)
+
+
+class SettledParts(NamedTuple):
+    """What of a prepared invocation follows from its contract and the rules for its skill, role and source."""
+
+    require: Guards
+    assume: Guards
+    maintain: Guards
+    chain: tuple[PreparedLink, ...]
+    candidates: Candidates
+    reads: tuple[tuple[int, int], ...]
+    rests_us: int
+    lasts_us: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -384,20 +403,17 @@ def prepare_invocation(
     problem = next(mission_checks.invocation(invocation, policy.policy, policy.tables.zones), None)
     if problem is not None:
         return Refusal("malformed", problem)
-    compiler, contract, plan = policy.compiler, invocation.contract, invocation.plan
-    candidates = policy.rules.candidates(invocation.skill, invocation.role, invocation.source)
-    clauses = [*contract.require, *contract.assume, *contract.maintain]
-    clauses += [rule.rule.when for rules in candidates for rule in rules if rule.rule.when is not None]
+    contract, plan, parts = invocation.contract, invocation.plan, _settled(invocation, policy)
     return PreparedInvocation(
         invocation=invocation,
         policy=policy,
         arguments=tuple(map(point, invocation.arguments)),
         misfit=misfit(invocation.arguments, contract),
-        require=compiler.guards(contract.require, contract),
-        assume=compiler.guards(contract.assume, contract),
-        maintain=compiler.guards(contract.maintain, contract),
-        chain=tuple(map(compiler.link, contract.fallback)),
-        candidates=candidates,
+        require=parts.require,
+        assume=parts.assume,
+        maintain=parts.maintain,
+        chain=parts.chain,
+        candidates=parts.candidates,
         planner=Planner(
             plan.kind,
             plan.path,
@@ -406,11 +422,35 @@ def prepare_invocation(
             near_home(policy.policy.vehicle),
         ),
         energy=Energy(contract, policy.policy.vehicle, plan.speed),
-        reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(clauses, policy.policy)),
+        reads=parts.reads,
         phase=_phase(invocation, policy.policy, phases),
+        rests_us=parts.rests_us,
+        lasts_us=parts.lasts_us,
+    )
+
+
+def _settled(invocation: Invocation, policy: PreparedPolicy) -> SettledParts:
+    """What follows from the contract and the rules; of the policy's own contracts it is kept."""
+    contract, key = invocation.contract, (invocation.skill, invocation.role, invocation.source)
+    kept = policy.settled.get(key)
+    if kept is not None and kept[0] is contract:
+        return kept[1]
+    compiler, candidates = policy.compiler, policy.rules.candidates(*key)
+    clauses = [*contract.require, *contract.assume, *contract.maintain]
+    clauses += [rule.rule.when for rules in candidates for rule in rules if rule.rule.when is not None]
+    parts = SettledParts(
+        require=compiler.guards(contract.require, contract),
+        assume=compiler.guards(contract.assume, contract),
+        maintain=compiler.guards(contract.maintain, contract),
+        chain=tuple(map(compiler.link, contract.fallback)),
+        candidates=candidates,
+        reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(clauses, policy.policy)),
         rests_us=MAX_GAP if monitored(clauses) else MAX_DURATION,
         lasts_us=longest(contract, policy.policy.vehicle),
     )
+    if contract is policy.policy.contracts[invocation.skill]:
+        policy.settled[key] = contract, parts
+    return parts
 
 
 def _airspace(airspace: Airspace, compiler: Compiler) -> PreparedAirspace:

@@ -5,22 +5,25 @@ core refuses what is certainly not permitted, the compiler what it cannot prove,
 decides.
 """
 
+import gc
 import json
 import re
 import select
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
 
 import msgspec
 
 from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.gateway.frames import parcels
 from rtshcua.adapters.gateway.messages import RelayKind, RelayMessage, Up
 from rtshcua.adapters.store.writing import append
 from rtshcua.app.fly.stop_wishes import Interrupts
@@ -209,9 +212,25 @@ class ClientJournal:
         self._writer.shutdown()
 
 
+def answers_first(actions: Sequence[interface.Action]) -> Iterator[interface.Action]:
+    """The actions in the order in which they are carried out: first the answers, for which clients wait, and what is
+    withheld from clients. Answers to one client are sent together, because each datagram wakes the relay.
+    """
+    for client, some in groupby(sorted(actions, key=_waits), key=_answered):
+        if client is None:
+            yield from some
+        else:
+            frames = [each.frame for each in some if isinstance(each, interface.ToClient)]
+            yield from (interface.ToClient(client, datagram) for datagram in parcels(frames))
+
+
 def _waits(action: interface.Action) -> bool:
-    """Whether an action is carried out after what clients are told, and what is withheld from them."""
     return not isinstance(action, interface.ToClient | interface.Withhold)
+
+
+def _answered(action: interface.Action) -> int | None:
+    """The client that an action sends a frame to; None for any other action."""
+    return action.client if isinstance(action, interface.ToClient) else None
 
 
 class GatewayService:
@@ -261,6 +280,8 @@ class GatewayService:
         return ended
 
     def _run(self) -> ExitCode | Refusal:
+        gc.collect()
+        gc.freeze()  # what is there stays: looking through it again and again takes longer than a refusal
         began_s, ending = time.monotonic(), False
         with Interrupts() as interrupts:
             while True:
@@ -323,6 +344,8 @@ class GatewayService:
             self._from_flight(now)
         if ticks:
             self._tick_us = now.monotonic_us
+            if self._frames is not None:
+                self._frames.read()
             self._take(interface.Tick(), now)
             self._hand_in_records()
         self._advance(now)
@@ -357,10 +380,13 @@ class GatewayService:
         return Now(now.monotonic_us, now.utc_us, min(now.utc_error_us, self._utc_error_us))
 
     def _take(self, event: Event, now: Now) -> None:
-        """Give the core an event, and carry out what it wants done: first the answers, for which clients wait."""
+        """Give the core an event, and carry out what it wants done."""
         if self._core is not None:
-            for action in sorted(self._core.take(event, now), key=_waits):
-                self._do(action, now)
+            self._carry_out(self._core.take(event, now), now)
+
+    def _carry_out(self, actions: list[interface.Action], now: Now) -> None:
+        for action in answers_first(actions):
+            self._do(action, now)
 
     # ---------------------------------------------------------------- what arrives
 
@@ -390,8 +416,7 @@ class GatewayService:
             accepted_commands(missions.program, dialect.load(), missions.policy), frames.state, frames.needed_us,
         )  # fmt: skip
         if self._core is not None:
-            for action in self._core.renew(settings, now):
-                self._do(action, now)
+            self._carry_out(self._core.renew(settings, now), now)
             return
         self._core = Gateway(settings)
         for number, client in self._clients.items():
@@ -462,8 +487,8 @@ class GatewayService:
 
     def _do(self, action: interface.Action, now: Now) -> None:
         match action:
-            case interface.ToClient(client, frame):
-                self._relay.answer(client, frame)
+            case interface.ToClient(client, frames):
+                self._relay.answer(client, frames)
             case interface.Withhold(client, messages):
                 assert self._heard is not None
                 self._relay.withhold(client, self._heard[0], messages)
@@ -476,10 +501,10 @@ class GatewayService:
                 self._request(number, frame, now)
             case interface.Cancel(_, reason):
                 self._cancel(reason, now)
-            case interface.ClientNote(text, said):
+            case interface.ClientNote(said):
                 self._console.tell({"event": "client", "told": said})
                 self._journal.keep({"at_us": time.time_ns() // 1_000, **said})
-                self._records.add(str(said["client"]), text)
+                self._records.add(str(said["client"]), action.text)
 
     def _request(self, number: int, frame: bytes, now: Now) -> None:
         if self._session is None or self._session.link.descriptor is None:

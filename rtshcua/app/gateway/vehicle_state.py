@@ -1,4 +1,5 @@
-"""The state of the vehicle for a first answer, made of its last frames only when it is asked for.
+"""The state of the vehicle for a first answer, made of the last frames of each message: those of the time between two
+ticks at once, and the newest when it is asked for.
 
 The flight decides on its own state, with the age of each measurement at its source. Here a value is as old as its
 report, so that it is never taken for older than it is.
@@ -78,6 +79,11 @@ class VehicleFrames:
 
     def state(self, now: Now) -> State:
         """The state now. Conditions over time need observations without a gap, so they are unknown here."""
+        self.read()
+        return self._monitor.state(now.monotonic_us)
+
+    def read(self) -> None:
+        """Read the frames that are kept."""
         frames = sorted((each for kept in self._last.values() for each in kept), key=lambda each: each[0])
         for at_us, data in frames:
             for frame in self._codec.parse(data, at_us):
@@ -86,4 +92,3 @@ class VehicleFrames:
                     self._monitor.update(Readings(at_us, values))
         for kept in self._last.values():
             kept.clear()
-        return self._monitor.state(now.monotonic_us)

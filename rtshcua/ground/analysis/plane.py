@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from math import isqrt
+from itertools import pairwise
+from math import hypot, inf, isqrt
 from typing import Any, Protocol
 
 from rtshcua.decision.outline import rings as outline
@@ -143,22 +144,37 @@ def _plan(zone: Zone) -> Any:
 
 
 def nearest_inside(zone: Zone, place: Point, margin_mm: int) -> Point | None:
-    """Return the place in the ground plan of a zone, this far from its edge, that is nearest to another one; None if
-    there is no room. Shapely computes it with floats, so the caller must verify it.
+    """Return the place in the ground plan of a zone, this far from its edge, that is nearest to another one outside of
+    it; None if there is no room. It is computed with floats, so the caller must verify it.
     """
-    import shapely  # noqa: PLC0415
-
-    room = _room(zone, margin_mm)
-    if room.is_empty:
-        return None
-    x, y = shapely.shortest_line(room, shapely.Point(place)).coords[0]
-    return round(x), round(y)
+    x, y = place
+    if zone.shape == CIRCLE:
+        middle_x, middle_y, square = zone.data
+        part = (square**0.5 - margin_mm) / (hypot(x - middle_x, y - middle_y) or 1.0)
+        return (round(middle_x + part * (x - middle_x)), round(middle_y + part * (y - middle_y))) if part > 0 else None
+    nearest, least = None, inf
+    for from_x, from_y, east, north, square_mm in _edges(zone, margin_mm):
+        part = min(max(((x - from_x) * east + (y - from_y) * north) / square_mm, 0.0), 1.0)
+        there_x, there_y = from_x + part * east, from_y + part * north
+        far = (there_x - x) ** 2 + (there_y - y) ** 2
+        if far < least:
+            nearest, least = (there_x, there_y), far
+    return None if nearest is None else (round(nearest[0]), round(nearest[1]))
 
 
 @lru_cache(maxsize=64)  # a client may ask for many places beyond the same zone
-def _room(zone: Zone, margin_mm: int) -> Any:
-    """The ground plan of a zone without a margin along its edge."""
-    return _plan(zone).buffer(-margin_mm)
+def _edges(zone: Zone, margin_mm: int) -> list[tuple[float, float, float, float, float]]:
+    """The edges of a zone's ground plan without a margin: where each begins, how far it leads east and north, and the
+    square of its length.
+    """
+    import shapely  # noqa: PLC0415
+
+    edges = []
+    for part in shapely.get_parts(_plan(zone).buffer(-margin_mm)):
+        for ring in (part.exterior, *part.interiors):
+            for (x, y), (to_x, to_y) in pairwise(ring.coords):
+                edges.append((x, y, to_x - x, to_y - y, (to_x - x) ** 2 + (to_y - y) ** 2))
+    return [each for each in edges if each[-1] > 0]
 
 
 def _exact_region(zone: Zone) -> Region | None:

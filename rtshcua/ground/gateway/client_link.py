@@ -1,8 +1,6 @@
 """One client: what it is, and what is sent to it and recorded about it."""
 
-import json
 from collections import deque
-from textwrap import shorten
 from typing import Any, Final
 
 from rtshcua.ground.gateway.client_frames import Received, made
@@ -15,9 +13,6 @@ TEXT_EVERY_US: Final = 5_000_000
 #: the most chunks of one text
 _MOST_CHUNKS: Final = 4
 _MOST_KEYS: Final = 64
-#: a `client` record: its most octets, and the most characters of a text in it
-LONGEST_RECORD: Final = 200
-_LONGEST_TEXT: Final = 80
 #: what a client can cause as often as it likes; everything else is recorded at any rate
 _OFTEN: Final = frozenset({"refused", "absorbed", "passed"})
 #: how many records at once, and the interval after that, us
@@ -135,7 +130,7 @@ class ClientLink:
             said["left_out"] = self._left_out
             self._left_out = 0
         said |= detail
-        self._actions.append(ClientNote(_brief(said), said))
+        self._actions.append(ClientNote(said))
 
 
 def _chunks(text: bytes) -> list[bytes]:
@@ -153,16 +148,3 @@ def _chunks(text: bytes) -> list[bytes]:
     if len(chunks) > 1 and len(chunks[-1]) == TEXT_OCTETS:
         chunks.append(b"")  # a text ends with a chunk that is not full
     return chunks
-
-
-def _brief(said: dict[str, Any]) -> str:
-    """A record for the flight's log: long texts are cut between words, and what does not fit is left out."""
-    brief: dict[str, Any] = {}
-    for key, value in said.items():
-        more = brief | {key: shorten(value, _LONGEST_TEXT, placeholder="...") if isinstance(value, str) else value}
-        brief = more if len(_compact(more)) <= LONGEST_RECORD else brief
-    return _compact(brief)
-
-
-def _compact(said: dict[str, Any]) -> str:
-    return json.dumps(said, separators=(",", ":"), ensure_ascii=True)

@@ -7,12 +7,18 @@ and carries out the actions.
 A client is a number, as the relay gives it; all frames are complete MAVLink frames, and those to clients are unsigned.
 """
 
+import json
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, TypeAlias
+from textwrap import shorten
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from rtshcua.decision.prepare import PreparedPolicy
 from rtshcua.ground.gateway.accepted import AcceptedCommand
 from rtshcua.model.flat.situation import Now, State
+
+#: a `client` record: its most octets, and the most characters of a text in it
+LONGEST_RECORD: Final = 200
+_LONGEST_TEXT: Final = 80
 
 # ---------------------------------------------------------------- configuration
 
@@ -202,10 +208,25 @@ class Cancel(NamedTuple):
 
 
 class ClientNote(NamedTuple):
-    """What happened to a frame of a client. `text` is for the flight's log: compact JSON, at most 200 bytes."""
+    """What happened to a frame of a client."""
 
-    text: str
     said: Mapping[str, Any]
+
+    @property
+    def text(self) -> str:
+        """For the flight's log: compact JSON, at most 200 bytes. Long texts are cut between words, and what does not
+        fit is left out. It is made when it is asked for: clients do not wait for it.
+        """
+        brief: dict[str, Any] = {}
+        for key, value in self.said.items():
+            cut = shorten(value, _LONGEST_TEXT, placeholder="...") if isinstance(value, str) else value
+            more = brief | {key: cut}
+            brief = more if len(_compact(more)) <= LONGEST_RECORD else brief
+        return _compact(brief)
+
+
+def _compact(said: Mapping[str, Any]) -> str:
+    return json.dumps(said, separators=(",", ":"), ensure_ascii=True)
 
 
 Action: TypeAlias = ToClient | Withhold | Propose | Withdraw | RequestFrame | Cancel | ClientNote

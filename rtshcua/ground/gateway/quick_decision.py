@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from rtshcua.decision.decide import decide, possible
-from rtshcua.decision.evaluate import Environment, build
+from rtshcua.decision.evaluate import Condition, Environment, build
 from rtshcua.decision.nearest import DAYTIME, LOCAL_TIME, ChangeSearch, Nearest, NearestChange, Offer, nearest, offer
-from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, PreparedRule, prepare_invocation
 from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.times import local_time
 from rtshcua.decision.tree import Both, Node, PointInside
@@ -71,6 +71,7 @@ class QuickDecision:
         self._policy = settings.policy
         self._state_of = settings.state_of
         self._margins: dict[int, int] = {}  # by zone
+        self._conjuncts: dict[int, list[tuple[Node, Condition]]] = {}  # by rule
         policy = settings.policy.policy
         self._skills = {contract.name: number for number, contract in enumerate(policy.contracts)}
         self._roles = {role: number for number, role in enumerate(policy.roles)}
@@ -93,10 +94,13 @@ class QuickDecision:
             return None
         near = nearest(decision, invocation, state, self._policy, now)
         near = self._accepted(near, step, role, context, state, now)
-        words = _words(decision, near, invocation, state, self._policy, now)
-        if decision.reason is Reason.OUT_OF_SCOPE and not near:
-            unmet = self._unmet(step, role, invocation, context, state, now)
-            words = f"{'; '.join(unmet)} ({decision.reason})" if unmet else words
+        out_of_scope = decision.reason is Reason.OUT_OF_SCOPE and not near
+        unmet = self._unmet(step, role, invocation, context, state, now) if out_of_scope else []
+        words = (
+            f"{'; '.join(unmet)} ({decision.reason})"
+            if unmet
+            else _words(decision, near, invocation, state, self._policy, now)
+        )
         parameters = {each.name for each in flat.contracts[self._skills[step.skill]].parameters}
         by_argument = bool(near) and all(each.subject in parameters for each in near)
         result = DENIED if decision.outcome is Outcome.DENY else TEMPORARILY_REJECTED
@@ -157,11 +161,18 @@ class QuickDecision:
 
     def _failed(self, invocation: PreparedInvocation, at: Environment) -> list[Node]:
         """The conditions that do not hold, of the permit that has the fewest."""
-        compiler, tables = self._policy.compiler, self._policy.tables
-        whens = (compiler.when(permit.rule) for permit in invocation.candidates.permits)
-        rules = (list(_conjuncts(when)) for when in whens if when is not None)
-        failed = ([each for each in rule if build(each, tables)(at) != TRUE] for rule in rules)
+        rules = (self._joined(permit) for permit in invocation.candidates.permits if permit.rule.when is not None)
+        failed = ([node for node, holds in rule if holds(at) != TRUE] for rule in rules)
         return min(failed, key=len, default=[])
+
+    def _joined(self, permit: PreparedRule) -> list[tuple[Node, Condition]]:
+        """The conditions that the condition of a permit joins by `and`, each also compiled, on first use."""
+        found = self._conjuncts.get(permit.number)
+        if found is None:
+            when, tables = self._policy.compiler.when(permit.rule), self._policy.tables
+            nodes = () if when is None else _conjuncts(when)
+            found = self._conjuncts[permit.number] = [(node, build(node, tables)) for node in nodes]
+        return found
 
     def _inside(
         self, condition: PointInside, step: ProposedStep, role: str, context: Context, state: State, now: Now

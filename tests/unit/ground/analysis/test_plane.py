@@ -1,7 +1,11 @@
 """Relations of zones, proved exactly, and places that show them."""
 
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
 from rtshcua.decision.zones import PreparedZone
-from rtshcua.ground.analysis.plane import Plane
+from rtshcua.ground.analysis.plane import Plane, nearest_inside
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
 
 RING = (0, 0, 9_000, 0, 9_000, 9_000, 0, 9_000, 3_000, 3_000, 3_000, 6_000, 6_000, 6_000, 6_000, 3_000)
@@ -42,3 +46,27 @@ def test_place_is_found_if_there_is_room() -> None:
 def test_no_place_is_returned_if_there_is_none() -> None:
     assert PLANE.place({1: True, 0: True}, anywhere) is None
     assert PLANE.place({1: True}, lambda place: place[0] > 9_000) is None
+
+
+_SPANS = st.integers(-60_000, 60_000)
+
+
+@given(st.tuples(_SPANS, _SPANS), st.integers(0, 6_000))
+def test_nearest_place_is_as_near_as_shapely_finds_one(place: tuple[int, int], margin_mm: int) -> None:
+    """Of an L, and of a circle."""
+    corner = (-30_000, -30_000, 30_000, -30_000, 30_000, 30_000, 10_000, 30_000, 10_000, 10_000, -30_000, 10_000)
+    zones = (
+        Zone("corner", POLYGON, LOWEST, HIGHEST, corner),
+        Zone("round", CIRCLE, LOWEST, HIGHEST, (5_000, -5_000, 20_000**2)),
+    )
+    for zone in zones:
+        plan = shapely.Polygon([*zip(corner[::2], corner[1::2], strict=True)])
+        if zone.shape == CIRCLE:
+            plan = shapely.Point(5_000, -5_000).buffer(20_000, quad_segs=64)
+        room = plan.buffer(-margin_mm)
+        found = nearest_inside(zone, place, margin_mm)
+        if room.contains(shapely.Point(place)):
+            continue
+        assert found is not None
+        assert shapely.Point(place).distance(shapely.Point(found)) <= shapely.Point(place).distance(room) + 10
+        assert room.distance(shapely.Point(found)) <= 10

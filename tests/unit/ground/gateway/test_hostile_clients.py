@@ -81,10 +81,10 @@ def checked(world: GatewayWorld, actions: list[Action]) -> None:
                 assert frame[5:7] == bytes([SYSTEM, 191])
             case ToClient(_, frame):
                 assert frame[5:7] == bytes([SYSTEM, 1])
-            case ClientNote(text):
-                assert len(text) <= 200
-                for name, value in json.loads(text).items():
-                    whole = each.said[name]
+            case ClientNote(said):
+                assert len(each.text) <= 200
+                for name, value in json.loads(each.text).items():
+                    whole = said[name]
                     if value != whole:  # cut at a space, with white space folded
                         assert value.endswith("...")
                         assert " ".join(str(whole).split()).startswith(value.removesuffix("...").rstrip())

@@ -6,7 +6,7 @@ before.
 """
 
 from collections import defaultdict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -270,9 +270,8 @@ class PreparedPolicy:
     """A policy that was checked and compiled. `limits` has one entry for each slot; `bounds` is the same by column:
     the stale ages, the least and the greatest values. `monitors` are in order.
 
-    `seen` caches the last single situation, as planners cache their last start and zones their last box; `settled` what
-    invocations of one contract and the same rules have in common, by skill, role and source. No answer depends on them,
-    and nothing else in a prepared policy ever changes.
+    `seen` caches the last single situation, as planners cache their last start and zones their last box. No answer
+    depends on it, and nothing else in a prepared policy ever changes.
     """
 
     policy: Policy
@@ -286,20 +285,6 @@ class PreparedPolicy:
     still: Planner  # plans without motion: the present place with its error
     monitors: tuple[PreparedMonitor, ...]
     seen: SeenSituation | None = None
-    settled: "dict[tuple[int, int, int], tuple[Contract, SettledParts]]" = field(default_factory=dict)
-
-
-class SettledParts(NamedTuple):
-    """What of a prepared invocation follows from its contract and the rules for its skill, role and source."""
-
-    require: Guards
-    assume: Guards
-    maintain: Guards
-    chain: tuple[PreparedLink, ...]
-    candidates: Candidates
-    reads: tuple[tuple[int, int], ...]
-    rests_us: int
-    lasts_us: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -403,17 +388,20 @@ def prepare_invocation(
     problem = next(mission_checks.invocation(invocation, policy.policy, policy.tables.zones), None)
     if problem is not None:
         return Refusal("malformed", problem)
-    contract, plan, parts = invocation.contract, invocation.plan, _settled(invocation, policy)
+    compiler, contract, plan = policy.compiler, invocation.contract, invocation.plan
+    candidates = policy.rules.candidates(invocation.skill, invocation.role, invocation.source)
+    clauses = [*contract.require, *contract.assume, *contract.maintain]
+    clauses += [rule.rule.when for rules in candidates for rule in rules if rule.rule.when is not None]
     return PreparedInvocation(
         invocation=invocation,
         policy=policy,
         arguments=tuple(map(point, invocation.arguments)),
         misfit=misfit(invocation.arguments, contract),
-        require=parts.require,
-        assume=parts.assume,
-        maintain=parts.maintain,
-        chain=parts.chain,
-        candidates=parts.candidates,
+        require=compiler.guards(contract.require, contract),
+        assume=compiler.guards(contract.assume, contract),
+        maintain=compiler.guards(contract.maintain, contract),
+        chain=tuple(map(compiler.link, contract.fallback)),
+        candidates=candidates,
         planner=Planner(
             plan.kind,
             plan.path,
@@ -422,35 +410,11 @@ def prepare_invocation(
             near_home(policy.policy.vehicle),
         ),
         energy=Energy(contract, policy.policy.vehicle, plan.speed),
-        reads=parts.reads,
-        phase=_phase(invocation, policy.policy, phases),
-        rests_us=parts.rests_us,
-        lasts_us=parts.lasts_us,
-    )
-
-
-def _settled(invocation: Invocation, policy: PreparedPolicy) -> SettledParts:
-    """What follows from the contract and the rules; of the policy's own contracts it is kept."""
-    contract, key = invocation.contract, (invocation.skill, invocation.role, invocation.source)
-    kept = policy.settled.get(key)
-    if kept is not None and kept[0] is contract:
-        return kept[1]
-    compiler, candidates = policy.compiler, policy.rules.candidates(*key)
-    clauses = [*contract.require, *contract.assume, *contract.maintain]
-    clauses += [rule.rule.when for rules in candidates for rule in rules if rule.rule.when is not None]
-    parts = SettledParts(
-        require=compiler.guards(contract.require, contract),
-        assume=compiler.guards(contract.assume, contract),
-        maintain=compiler.guards(contract.maintain, contract),
-        chain=tuple(map(compiler.link, contract.fallback)),
-        candidates=candidates,
         reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(clauses, policy.policy)),
+        phase=_phase(invocation, policy.policy, phases),
         rests_us=MAX_GAP if monitored(clauses) else MAX_DURATION,
         lasts_us=longest(contract, policy.policy.vehicle),
     )
-    if contract is policy.policy.contracts[invocation.skill]:
-        policy.settled[key] = contract, parts
-    return parts
 
 
 def _airspace(airspace: Airspace, compiler: Compiler) -> PreparedAirspace:

@@ -378,26 +378,6 @@ def test_a_mission_may_tighten(tighter: Any) -> None:
     assert isinstance(prepare_invocation(replace(S, contract=tighter), POLICY, flat.MISSION.phases), PreparedInvocation)
 
 
-def test_what_is_kept_of_a_contract_is_not_used_for_a_tighter_one() -> None:
-    tighter = replace(S.contract, require=(*S.contract.require, S.contract.assume[0]), duration_us=1)
-    fresh = prepare(POLICY.policy)
-    assert isinstance(fresh, PreparedPolicy)
-    first = prepare_invocation(replace(S, contract=tighter), fresh, flat.MISSION.phases)
-    own, again, later = (
-        prepare_invocation(replace(S, contract=each), fresh, flat.MISSION.phases)
-        for each in (fresh.policy.contracts[S.skill], fresh.policy.contracts[S.skill], tighter)
-    )
-    assert isinstance(first, PreparedInvocation)
-    assert isinstance(own, PreparedInvocation)
-    assert isinstance(again, PreparedInvocation)
-    assert isinstance(later, PreparedInvocation)
-    assert again.require is own.require
-    for each in (first, later):
-        assert [clause for clause, _ in each.require] == [*tighter.require]
-        assert each.lasts_us != own.lasts_us
-    assert [clause for clause, _ in own.require] == [*S.contract.require]
-
-
 def test_a_text_that_was_cut_may_begin_as_another_does() -> None:
     cut = "x" * (MAX_TEXT - 3) + "..."
     of = prepare(contract(INSPECT, assume=(replace(S.contract.assume[0], text=cut), *S.contract.assume[1:])))

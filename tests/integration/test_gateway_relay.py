@@ -33,7 +33,7 @@ from hostile.relayed import (
     udp_client,
     until,
 )
-from rtshcua.adapters.gateway.messages import EVERY_CLIENT, ClientSetup, RelayKind, Up
+from rtshcua.adapters.gateway.messages import EVERY_CLIENT, ClientSetup, RelayKind, Up, encoded
 from rtshcua.adapters.gateway.process import RelayError, RelayProcess
 from rtshcua.diagnostics.exits import ExitCode
 
@@ -88,7 +88,15 @@ def test_only_a_session_and_a_pilot_reach_the_vehicle(opened: Callable[..., Any]
     pilot.send(asked)
     pilot.send(arming(3) + asked + arming(4))
     assert gateway.vehicle.recv(4_096) == arming(3) + arming(4), "the gateway answers requests for control"
-    assert gateway.next(RelayKind.PILOT, lambda each: each.payload not in (beat(), arming(1))).payload == asked
+    message = gateway.next(RelayKind.PILOT, lambda each: each.payload not in (beat(), arming(1)))
+    assert message.payload == asked
+    gateway.process.control.send(encoded(RelayKind.VEHICLE, 0, bytes([1])))
+    gateway.process.control.send(encoded(RelayKind.ANSWER, message.client, beat()))
+    assert pilot.recv(4_096) == beat(), "it has read both"
+    asks = mavlink.MAVLink_command_long_message(2, 1, 32_100, 0, 1, 0, 0, 0, 0, 0, 0)
+    elsewhere = bytes(asks.pack(mavlink.MAVLink(None, srcSystem=255, srcComponent=190)))
+    pilot.send(asked + elsewhere)
+    assert gateway.vehicle.recv(4_096) == elsewhere, "control of another vehicle is no business of the gateway"
 
 
 @pytest.mark.parametrize("address", [UDP, TCP])

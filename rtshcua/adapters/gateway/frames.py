@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 from typing import Final
 
 from rtshcua.codec.frames import kind_of
-from rtshcua.mavlink.enums import MAV_CMD_REQUEST_OPERATOR_CONTROL
+from rtshcua.mavlink.enums import MAV_CMD_REQUEST_OPERATOR_CONTROL, MAV_COMP_ID_AUTOPILOT1
 from rtshcua.mavlink.framing import (
     CHECKSUM,
     FLAG_SIGNED,
@@ -23,8 +23,8 @@ from rtshcua.mavlink.framing import (
 )
 from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG
 
-#: the offset of the command in the payload of COMMAND_LONG and COMMAND_INT
-_COMMAND_AT: Final = 28
+#: the offsets of the command and its target in the payload of COMMAND_LONG and COMMAND_INT
+_COMMAND_AT, _TARGET_AT = 28, 30
 _REQUEST_CONTROL: Final = MAV_CMD_REQUEST_OPERATOR_CONTROL.to_bytes(2, "little")
 #: the most octets of a datagram that several frames share: none is fragmented on Ethernet or Wi-Fi
 MOST_SHARED: Final = 1_400
@@ -52,11 +52,17 @@ def _walked(datagram: bytes) -> Sequence[int] | None:
     return numbers or None
 
 
-def asks_for_control(frame: bytes) -> bool:
-    """Whether a frame is a command REQUEST_OPERATOR_CONTROL, whose number has one place in both kinds of commands."""
-    at = HEADER + _COMMAND_AT
-    is_command = frame[0] == MARKER and number_of(frame) in (COMMAND_INT, COMMAND_LONG)
-    return is_command and frame[1] > _COMMAND_AT + 1 and frame[at : at + 2] == _REQUEST_CONTROL
+def asks_for_control(frame: bytes, system: int = 0) -> bool:
+    """Whether a frame is a command REQUEST_OPERATOR_CONTROL to the autopilot of a system, by default to anything. The
+    command and its target have one place in both kinds of commands.
+    """
+    if frame[0] != MARKER or number_of(frame) not in (COMMAND_INT, COMMAND_LONG):
+        return False
+    payload = frame[HEADER : HEADER + frame[1]].ljust(_TARGET_AT + 2, b"\0")  # trailing zeros are not sent
+    if payload[_COMMAND_AT : _COMMAND_AT + 2] != _REQUEST_CONTROL:
+        return False
+    to_system, to_component = payload[_TARGET_AT : _TARGET_AT + 2]
+    return not system or (to_system in (0, system) and to_component in (0, MAV_COMP_ID_AUTOPILOT1))
 
 
 def without(datagram: bytes, numbers: Collection[int], sender: tuple[int, int] | None = None) -> bytes:

@@ -46,8 +46,8 @@ class RelayKind(IntEnum):
     MAVLink 2 (those of MAVLink 1 are converted), with a right checksum where the dialect has the message; their
     signatures were not verified."""
     PILOT = 6
-    """Frames of a pilot, which went to the vehicle, except REQUEST_OPERATOR_CONTROL, which the starter answers.
-    Payload: one or more whole frames."""
+    """Frames of a pilot, which went to the vehicle, except REQUEST_OPERATOR_CONTROL of its autopilot, or of any while
+    the starter has not said which `VEHICLE` it is: that the starter answers. Payload: one or more whole frames."""
     FLIGHT_ENDED = 7
     "The socket of the session was closed by the other side. Nothing of it goes to the vehicle any more. No payload."
     COUNTERS = 8
@@ -61,6 +61,9 @@ class RelayKind(IntEnum):
     one without numbers ends it."""
     FLIGHT = 18
     "A session begins: its socket is in the ancillary data. It replaces the previous one. No payload."
+    VEHICLE = 19
+    """Payload: the system of the vehicle, 1 octet. From now on what pilots send to other systems and components passes,
+    also REQUEST_OPERATOR_CONTROL."""
 
 
 #: what an ordinary client never gets from the vehicle, because it belongs to a dialogue with FLIGHT or with a pilot;

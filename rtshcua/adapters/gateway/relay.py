@@ -167,10 +167,9 @@ class Relay:
         peer.counts.frames += len(frames)
         datagram = frames[0] if len(frames) == 1 else b"".join(frames)
         if peer.setup.pilot:
-            if not any(map(asks_for_control, frames)):
-                self._to_vehicle(datagram)
-            elif passed := [each for each in frames if not asks_for_control(each)]:
-                self._to_vehicle(b"".join(passed))
+            passed = [each for each in frames if not asks_for_control(each, self._system)]
+            if passed:
+                self._to_vehicle(datagram if len(passed) == len(frames) else b"".join(passed))
             self._tell(RelayKind.PILOT, peer.number, datagram)
         else:
             self._tell(RelayKind.CLIENT, peer.number, datagram)
@@ -184,6 +183,7 @@ class Relay:
         self._stream = FrameStream(every=True)
         self._place: Hashable = None
         self._heard_us = 0
+        self._system = 0  # of the vehicle, once the starter has said it
         self._autopilot = 0, MAV_COMP_ID_AUTOPILOT1
         self._vehicle_at: set[int] = set()
         try:
@@ -325,6 +325,8 @@ class Relay:
             numbers = (payload[start : start + 3] for start in range(1, len(payload), 3))
             self._peers[client].withheld = frozenset(int.from_bytes(each, "little") for each in numbers)
             self._autopilot = payload[0], MAV_COMP_ID_AUTOPILOT1
+        elif kind is RelayKind.VEHICLE:
+            self._system = payload[0]
         elif kind is RelayKind.FLIGHT and descriptors:
             self._begin_flight(descriptors[0])
 

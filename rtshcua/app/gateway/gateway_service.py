@@ -37,6 +37,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.gateway import interface
 from rtshcua.ground.gateway.accepted import accepted_commands
+from rtshcua.ground.gateway.client_link import without_vehicle
 from rtshcua.ground.gateway.interface import ClientSettings, Event, GatewaySettings
 from rtshcua.ground.gateway.translator import Gateway
 from rtshcua.mavlink import dialect
@@ -367,6 +368,8 @@ class GatewayService:
         if isinstance(relay, Refusal):
             return relay
         self._relay = relay
+        if self._heard is not None:
+            relay.know_vehicle(self._heard[0])
         return None
 
     def _now(self) -> Now:
@@ -393,6 +396,7 @@ class GatewayService:
     def _from_vehicle(self, frame: bytes, now: Now) -> None:
         if self._heard is None and self._is_heartbeat(frame):
             self._heard = sender_of(frame)[0], frame[HEADER + _AUTOPILOT_AT]
+            self._relay.know_vehicle(self._heard[0])
             self._begin_core(now)
         if self._frames is not None:
             self._frames.take(frame, now.monotonic_us)
@@ -441,9 +445,13 @@ class GatewayService:
                     self._console.tell({"event": "client-down", "client": client, "name": gone.name, "why": why})
                     self._take(interface.ClientDown(client), now)
             case RelayKind.CLIENT | RelayKind.PILOT:
-                of = interface.FromClient if message.kind is RelayKind.CLIENT else interface.FromPilot
+                pilot = message.kind is RelayKind.PILOT
                 for frame in frames_in(message.payload):
-                    self._take(of(client, frame), now)
+                    if self._core is None:
+                        self._carry_out(without_vehicle(client, frame, pilot=pilot), now)
+                    else:
+                        of = interface.FromPilot if pilot else interface.FromClient
+                        self._take(of(client, frame), now)
 
     def _from_flight(self, now: Now) -> None:
         session = self._session

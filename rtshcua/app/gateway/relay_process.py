@@ -66,6 +66,11 @@ class StartedRelay(RelayProcess):
         with suppress(OSError):
             self.control.send(encoded(RelayKind.WITHHOLD, client, withheld(system, sorted(numbers))))
 
+    def know_vehicle(self, system: int) -> None:
+        """Say which system the vehicle is."""
+        with suppress(OSError):
+            self.control.send(encoded(RelayKind.VEHICLE, 0, bytes([system])))
+
     def again(self) -> "StartedRelay | Refusal":
         """A new relay in the place of this one, which ended."""
         self.close()

@@ -58,6 +58,7 @@ LAYOUTS_OF_CLIENTS: Final = LAYOUTS | {
     layouts.AUTOPILOT_VERSION_REQUEST: layout(85, "<BB", _TARGET),
     layouts.HOME_POSITION: layout(104, "<iii", "latitude longitude altitude"),
     layouts.SETUP_SIGNING: layout(71, "<Q", "initial_timestamp"),
+    layouts.COMMAND_CANCEL: layout(14, "<HBB", f"command {_TARGET}"),
     layouts.CONTROL_STATUS: layout(21, "<BB", "flags gcs_main"),  # of the development dialect, since 2026
 }  # fmt: skip
 

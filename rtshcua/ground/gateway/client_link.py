@@ -3,9 +3,10 @@
 from collections import deque
 from typing import Any, Final
 
-from rtshcua.ground.gateway.client_frames import Received, made
+from rtshcua.ground.gateway.client_frames import Received, made, received
 from rtshcua.ground.gateway.interface import Action, ClientNote, ClientSettings, ToClient
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import TEMPORARILY_REJECTED
 from rtshcua.mavlink.layouts import TEXT_OCTETS
 
 #: a text with the same key is sent once in this time, us
@@ -18,6 +19,8 @@ _OFTEN: Final = frozenset({"refused", "absorbed", "passed"})
 #: how many records at once, and the interval after that, us
 _RECORDS: Final = 20
 _RECORD_EVERY_US: Final = 200_000
+_TARGET: Final = ("target_system", "target_component")
+_FIRST_SYSTEM: Final = 1  # what autopilots are unless they are told otherwise
 #: MAV_SEVERITY
 WARNING: Final = 4
 NOTICE: Final = 5
@@ -131,6 +134,24 @@ class ClientLink:
             self._left_out = 0
         said |= detail
         self._actions.append(ClientNote(said))
+
+
+def without_vehicle(client: int, frame: bytes, *, pilot: bool) -> list[Action]:
+    """The answer to a command before a vehicle was heard: not now, with a text, from whom it is for. Of a pilot's
+    commands only those that request control are answered; all others went to the vehicle's link.
+    """
+    message = received(frame)
+    if message is None or message.message not in (layouts.COMMAND_LONG, layouts.COMMAND_INT):
+        return []
+    command, to_system, to_component = (message.fields[each] for each in ("command", *_TARGET))
+    if pilot and command != enums.MAV_CMD_REQUEST_OPERATOR_CONTROL:
+        return []
+    of = to_system or _FIRST_SYSTEM, to_component or enums.MAV_COMP_ID_AUTOPILOT1
+    answer = {"command": command, "result": TEMPORARILY_REJECTED, "progress": 255}
+    answer |= dict(zip(_TARGET, message.sender, strict=True))
+    said = {"severity": WARNING, "text": b"no vehicle was heard yet: ask again"}
+    frames = made(layouts.STATUSTEXT, said, of, 0), made(layouts.COMMAND_ACK, answer, of, 1)
+    return [ToClient(client, each) for each in frames]
 
 
 def _chunks(text: bytes) -> list[bytes]:

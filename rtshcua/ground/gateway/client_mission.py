@@ -77,6 +77,9 @@ class ClientMissions:
         if upload is not None:
             upload.transfer.checked(refusal, now_us)
             self.of_mission(upload, now_us)
+            if refusal is None and upload.transfer.plan is not None:
+                for item in upload.transfer.plan.items:
+                    self._proposing.tell_yaw(upload, item, now_us)
             return True
         name, plan = self._rechecks.pop(number, ("", None))
         if plan is not None and refusal is not None and self._state.plans.get(name) is plan:

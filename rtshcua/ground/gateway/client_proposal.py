@@ -92,12 +92,14 @@ class ClientProposal:
         return next((each.command for each in self.asked_by if each.command >= 0), -1)
 
     def refuse(self, result: int, text: str, now_us: int) -> None:
-        """End it with a reason. A step that was acknowledged before is only told about."""
+        """End it with a reason. A step that was acknowledged before is only told about; what was withdrawn before it
+        began is cancelled, however it ends.
+        """
         if not self.ended:
             self.ended = True
             self.link.text(text, now_us, "" if self.command >= 0 else "setpoint refused")
             self.link.record("refused", now_us, command=self.command, skill=self.steps[0].skill, reason=text)
-            self.answer(result)
+            self.answer(CANCELLED if self.withdrawn else result)
 
     def supersede(self) -> None:
         """Another proposal takes its place."""

@@ -67,10 +67,10 @@ class Pilots:
         if message.message not in _RECORDED:
             return False
         command = message.fields.get("command")
-        asks = command == enums.MAV_CMD_REQUEST_OPERATOR_CONTROL
+        asks = command == enums.MAV_CMD_REQUEST_OPERATOR_CONTROL and message.is_for(self._system)
         detail = {} if command is None else {"command": command}
         link.record("absorbed" if asks else "passed", now_us, message=message.message, **detail)
-        if not asks or not message.is_for(self._system):
+        if not asks:
             return False
         before, who = self._holder, (client, message.system)
         if _requests_control(message):

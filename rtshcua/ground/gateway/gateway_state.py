@@ -39,6 +39,8 @@ class ClientSource:
     shadows: dict[str, float] = field(default_factory=dict)
     mission: tuple[ClientProposal, UploadedPlan] | None = None
     withdrawn: str = ""
+    #: whether it knows that the yaw in its messages is not flown
+    told_yaw: bool = False
     #: when its last commands were decided, us: those of other skills, and those of safe ones
     decided: tuple[deque[int], deque[int]] = field(
         default_factory=lambda: (deque(maxlen=MOST_DECISIONS), deque(maxlen=MOST_DECISIONS))

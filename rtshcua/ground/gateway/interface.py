@@ -219,8 +219,7 @@ class ClientNote(NamedTuple):
         """
         brief: dict[str, Any] = {}
         for key, value in self.said.items():
-            cut = shorten(value, _LONGEST_TEXT, placeholder="...") if isinstance(value, str) else value
-            more = brief | {key: cut}
+            more = brief | {key: shorten(value, _LONGEST_TEXT, placeholder="...") if isinstance(value, str) else value}
             brief = more if len(_compact(more)) <= LONGEST_RECORD else brief
         return _compact(brief)
 

@@ -28,6 +28,7 @@ SETPOINT_US: Final = 500_000
 HELD_US: Final = 10_000_000
 _ITEMS: Final = (layouts.MISSION_ITEM_INT, layouts.MISSION_ITEM)
 _NO_FLIGHT: Final = "no flight is ready yet"
+_YAW: Final = "yaw is not flown: the autopilot turns the vehicle"
 _LANDS: Final = "the vehicle is still landing"
 #: the most proposals of one client that are neither taken nor refused
 MOST_OPEN: Final = 4
@@ -99,7 +100,14 @@ class Proposing:
             client.link.record("refused", now_us, skill=steps[0].skill, reason=_TOO_MANY_WAIT)
             return TEMPORARILY_REJECTED
         self._add(client, steps, asked, now_us)
+        self.tell_yaw(client, message, now_us)
         return None
+
+    def tell_yaw(self, client: ConnectedClient, message: Received, now_us: int) -> None:
+        """Tell a client, once, that the yaw in its message is not flown."""
+        if not client.source.told_yaw and self._state.translation.drops_yaw(message):
+            client.source.told_yaw = True
+            client.link.text(_YAW, now_us, severity=NOTICE)
 
     def _add(self, client: ConnectedClient, steps: tuple[ProposedStep, ...], asked: AskedBy, now_us: int) -> None:
         """Propose steps. After those that stop, return or land the vehicle nothing follows from before."""
@@ -238,13 +246,41 @@ class Proposing:
 
     def _withdraw_waiting(self, why: str, now_us: int, name: str = "", *, safe_too: bool = False) -> None:
         """Withdraw what waits for a flight, or was not handed in to it yet, of all clients or of one of them."""
-        for held in [one for one in self._held if name in ("", one.client.link.name)]:
-            self._held.remove(held)
-            held.client.link.ack(held.message.sender, held.command, CANCELLED)
-        for each in self._pending(name, safe_too=safe_too):
+        held = [one for one in self._held if name in ("", one.client.link.name)]
+        self._withdraw(held, self._pending(name, safe_too=safe_too), why, now_us)
+
+    def _withdraw(self, held: list[_Held], pending: list[ClientProposal], why: str, now_us: int) -> None:
+        """Withdraw what waits for a flight, and of the proposals those that were not handed in to it yet."""
+        for one in held:
+            self._held.remove(one)
+            one.client.link.ack(one.message.sender, one.command, CANCELLED)
+        for each in pending:
             if each.first < 0:
                 self._state.actions.append(Withdraw(each.number))
                 each.refuse(CANCELLED, f"{each.steps[0].skill} withdrawn: {why}", now_us)
+
+    def cancel(self, client: ConnectedClient, command: int, now_us: int) -> None:
+        """COMMAND_CANCEL: withdraw what a client asked for by this command and what did not begin yet, which answers
+        that command. One that was answered before is over, and is not cancelled.
+        """
+        name, why = client.link.name, f"{client.link.name} cancels the command"
+        held = [each for each in self._held if each.command == command and each.client.link.name == name]
+        pending = [
+            each
+            for each in self._pending(name, safe_too=True)
+            if not each.answered and any(asked.command == command for asked in each.asked_by)
+        ]
+        if not held and not pending:
+            text = f"command {command} is not in progress: stop, return or land"
+            client.link.text(text, now_us, text, NOTICE)
+            client.link.record("absorbed", now_us, message=layouts.COMMAND_CANCEL, command=command)
+            return
+        client.link.record("withdrawn", now_us, command=command)
+        self._withdraw(held, pending, why, now_us)
+        for each in pending:
+            each.withdrawn = each.withdrawn or ("" if each.ended else why)
+        self._cancel_withdrawn(now_us)
+        self.tidy(now_us)
 
     def _pending(self, name: str, *, safe_too: bool) -> list[ClientProposal]:
         """The proposals of which no step was dispatched, of all clients or of one of them; those that only stop, return

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.ground.agent.value_patterns import written
 from rtshcua.ground.checker.checks.accepts import scale_of
-from rtshcua.ground.gateway.accepted import UNITS_OF_PARAMETERS, AcceptedCommand, ArgumentSource
+from rtshcua.ground.gateway.accepted import COMMAND, ITEM, MESSAGE, UNITS_OF_PARAMETERS, AcceptedCommand, ArgumentSource
 from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.interface import GatewaySettings, ProposedStep
 from rtshcua.ground.gateway.vehicle_seen import VehicleSeen
@@ -34,6 +34,10 @@ _WHOLE: Final = frozenset({layouts.COMMAND_INT, layouts.MISSION_ITEM_INT, layout
 _PLACED: Final = {"param5": "x", "param6": "y", "param7": "z"}
 _WITH_XYZ: Final = frozenset({layouts.COMMAND_INT, layouts.MISSION_ITEM_INT, layouts.MISSION_ITEM})
 _POLE: Final = 900_000_000
+#: NAV_WAYPOINT, NAV_LOITER_UNLIM, NAV_LAND, NAV_TAKEOFF, DO_REPOSITION: `param4` is the yaw, or NaN
+_WITH_YAW: Final = frozenset({16, 17, 21, 22, 192})
+#: POSITION_TARGET_TYPEMASK_YAW_IGNORE and _YAW_RATE_IGNORE
+_YAW_IGNORED: Final = 1 << 10 | 1 << 11
 #: what an argument is that the message does not give, without a look at the vehicle's parameters
 _WITHOUT_VALUE: Final = frozenset({"default", "here", ""})
 #: an argument: its cells in canonical units, and its text in the language
@@ -95,6 +99,16 @@ class Translation:
     def knows(self, kind: str, number: int) -> bool:
         """Whether the table has any row for it, whatever its other fields say."""
         return (kind, number) in self._rows
+
+    def drops_yaw(self, message: Received) -> bool:
+        """Whether a message that has a mapping asks for a yaw that no argument of its skill is read from."""
+        if not _asks_for_yaw(message, self._autopilot):
+            return False
+        kind, number = MESSAGE, message.message
+        if "command" in message.fields:
+            kind, number = (ITEM if "seq" in message.fields else COMMAND), message.fields["command"]
+        row = self.row(kind, number, message)
+        return row is not None and not any({"param4", "yaw"}.intersection(each.fields) for each in row.arguments)
 
     def contract(self, skill: str) -> Contract | None:
         """The policy's contract of a skill; None if no rule of the policy names it."""
@@ -247,6 +261,17 @@ def _field(message: Received, name: str) -> float:
     if message.message in _WITH_XYZ:
         name = _PLACED.get(name, name)
     return message.number(name)
+
+
+def _asks_for_yaw(message: Received, autopilot: int) -> bool:
+    """Whether a message asks for a yaw or a yaw rate. ArduCopter heeds none in these commands and items, where clients
+    leave it 0.
+    """
+    mask = message.fields.get("type_mask")
+    if mask is not None:
+        return bool(~mask & _YAW_IGNORED)
+    yaw, command = message.number("param4"), message.fields.get("command")
+    return command in _WITH_YAW and not isnan(yaw) and (autopilot == PX4 or yaw != 0)
 
 
 def _frame(message: Received) -> int | None:

@@ -144,6 +144,9 @@ class Gateway:
         return {
             layouts.COMMAND_LONG: self._command,
             layouts.COMMAND_INT: self._command,
+            layouts.COMMAND_CANCEL: lambda client, message, now: self._proposing.cancel(
+                client, message.fields["command"], now.monotonic_us
+            ),
             layouts.SET_MODE: self._set_mode,
             **dict.fromkeys(SETPOINTS, self._setpoint),
             layouts.PARAM_SET: self._param_set,
@@ -174,9 +177,10 @@ class Gateway:
         if message.message in _SAYS_NOTHING:
             return
         if not message.is_for(self._state.settings.system):
-            if message.message in _COMMANDS and message.fields["target_system"] == self._state.settings.system:
-                command = message.fields["command"]
-                client.reject(f"command {command} is for another component: refused", command, now.monotonic_us)
+            if message.message in _COMMANDS:
+                command, system = message.fields["command"], message.fields["target_system"]
+                whom = "another component" if system in (0, self._state.settings.system) else f"system {system}"
+                client.reject(f"command {command} is for {whom}: refused", command, now.monotonic_us)
             return
         handler = self._handlers.get(message.message)
         if message.message not in _COMMANDS:

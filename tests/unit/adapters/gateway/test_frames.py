@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.gateway.frames import (
     MOST_SHARED,
+    asks_for_control,
     good_frames,
     numbers_in,
     parcels,
@@ -156,3 +157,16 @@ def test_frame_of_mavlink_1_with_a_wrong_checksum_is_no_good() -> None:
 @pytest.mark.parametrize("frame", [SOME[0], b"\xfe\x00\x00\x01\x01\x03\x00\x00"])
 def test_other_frames_stay_as_they_are(frame: bytes) -> None:
     assert upgraded(frame) == frame
+
+
+@given(st.tuples(st.integers(0, 255), st.integers(0, 255)), st.sampled_from((0, 1, 7)), st.booleans(), st.booleans())
+def test_requests_for_control_of_the_vehicle_are_told_from_those_to_others(
+    target: tuple[int, int], system: int, whole: bool, asks: bool
+) -> None:
+    command = 32_100 if asks else 400
+    made = mavlink.MAVLink_command_int_message if whole else mavlink.MAVLink_command_long_message
+    values = (6, command, 0, 0, 0, 0, 0, 0, 0, 0, 0) if whole else (command, 0, 1, 0, 0, 0, 0, 0, 0)
+    frame = bytes(made(*target, *values).pack(SPEAKER))
+    to_vehicle = target[0] in (0, system) and target[1] in (0, 1)
+    assert asks_for_control(frame, system) is (asks and (to_vehicle or system == 0))
+    assert not any(asks_for_control(each, system) for each in SOME)

@@ -16,6 +16,7 @@ from reference.gateway_world import (
     texts,
     told,
 )
+from rtshcua.ground.gateway.client_frames import made
 from rtshcua.ground.gateway.interface import (
     Action,
     Cancel,
@@ -31,6 +32,7 @@ from rtshcua.ground.gateway.interface import (
     ToClient,
     Withdraw,
 )
+from rtshcua.mavlink import layouts
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 
 TAKEOFF = command_long(22, 0, 0, 0, 0, 0, 0, 503)
@@ -346,8 +348,73 @@ def test_what_is_with_the_flight_is_cancelled_and_the_client_is_not_told_that_it
     assert not cancels(actions), "nothing can be cancelled yet"
     assert cancels(world.line(type="mission")) == [1]
     assert cancels(world.wait(5_000_000)) == [], "once"
-    assert acks(world.line(type="close", ending="cancelled")) == [(22, 1)]
+    assert acks(world.line(type="close", ending="cancelled")) == [(22, 6)]
     assert acks(world.send(DISARMS)) == [(400, 0)]
+
+
+def command_cancel(
+    world: GatewayWorld, command: int, client: int = 1, target: tuple[int, int] = (1, 1)
+) -> list[Action]:
+    values = {"command": command, "target_system": target[0], "target_component": target[1]}
+    return world.take(FromClient(client, made(layouts.COMMAND_CANCEL, values, (245, 190), 0)))
+
+
+def test_a_command_that_waits_for_a_flight_is_cancelled() -> None:
+    world = GatewayWorld()
+    world.client(2, "other")
+    assert acks(world.send(TAKEOFF)) == [(22, 5)]
+    assert acks(command_cancel(world, 22, 2), 2) == []
+    assert texts(command_cancel(world, 22, 2), 2) == [], "once"
+    assert acks(command_cancel(world, 192)) == []
+    assert command_cancel(world, 22, target=(1, 100)) == []
+    actions = command_cancel(world, 22)
+    assert (acks(actions), texts(actions)) == ([(22, 6)], [])
+    world.ready()
+    assert proposals(world.wait(1_000_000)) == []
+
+
+def test_a_command_is_cancelled_before_its_step_is_handed_in() -> None:
+    world = GatewayWorld()
+    world.ready()
+    proposed = number(world.send(TAKEOFF))
+    actions = command_cancel(world, 22)
+    assert Withdraw(proposed) in actions
+    assert (acks(actions), texts(actions)) == ([(22, 6)], ["takeoff withdrawn: script cancels the command"])
+    assert cancels(world.line(type="mission")) == []
+    assert texts(command_cancel(world, 22)) == ["command 22 is not in progress: stop, return or land"]
+
+
+def test_a_command_that_the_flight_has_is_cancelled_with_the_flight() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    assert acks(command_cancel(world, 22)) == []
+    assert cancels(world.line(type="mission")) == [1]
+    assert acks(command_cancel(world, 22)) == [], "repeated until it is answered"
+    assert acks(world.line(type="close", ending="cancelled")) == [(22, 6)]
+
+
+def test_a_command_that_was_answered_is_not_cancelled() -> None:
+    world = GatewayWorld()
+    world.fly()
+    world.accept(world.send(reposition()))
+    assert acks(world.dispatch(0)) == [(192, 0)]
+    actions = command_cancel(world, 192)
+    assert (acks(actions), cancels(actions)) == ([], [])
+    assert texts(actions) == ["command 192 is not in progress: stop, return or land"]
+    assert [each["effect"] for each in records(actions)] == ["absorbed"]
+
+
+def test_a_pilots_request_for_another_vehicle_gives_no_control_here() -> None:
+    world = GatewayWorld()
+    world.client(9, "tower", pilot=True)
+    for target in ((2, 1), (1, 100)):
+        asks = command_long(32100, 1)
+        asks.target_system, asks.target_component = target
+        actions = world.send(asks, client=9, sender=(250, 1), pilot=True)
+        assert [each["effect"] for each in records(actions)] == ["passed"]
+        assert controls(actions) == []
+        assert acks(actions, 9) == []
 
 
 @pytest.mark.parametrize("message", [DISARMS, *SAFE])

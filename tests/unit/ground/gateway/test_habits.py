@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference.gateway_world import (
+    NORTH,
     SYSTEM,
     GatewayWorld,
     acks,
@@ -21,8 +22,17 @@ from reference.gateway_world import (
     told,
 )
 from reference.sources import CHECKOUT
-from rtshcua.ground.gateway.accepted import COMMAND, AcceptedCommand
-from rtshcua.ground.gateway.interface import Action, ClientNote, FlightEnded, Propose, RequestFrame, Withhold
+from rtshcua.ground.gateway.accepted import COMMAND, AcceptedCommand, ArgumentSource
+from rtshcua.ground.gateway.client_link import without_vehicle
+from rtshcua.ground.gateway.interface import (
+    Action,
+    ClientNote,
+    FlightEnded,
+    Propose,
+    RequestFrame,
+    ToClient,
+    Withhold,
+)
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 
 BEAT = frozenset({0})
@@ -399,8 +409,84 @@ def test_what_says_something_about_the_client_is_passed_over() -> None:
 
 def test_frames_for_another_system_are_not_answered() -> None:
     world = GatewayWorld()
-    assert world.send(mavlink.MAVLink_command_long_message(9, 1, 22, 0, 0, 0, 0, 0, 0, 0, 10)) == []
+    actions = world.send(mavlink.MAVLink_command_long_message(9, 1, 22, 0, 0, 0, 0, 0, 0, 0, 10))
+    assert (acks(actions), texts(actions)) == ([], ["command 22 is for system 9: refused"])
+    assert [each.said["effect"] for each in actions if isinstance(each, ClientNote)] == ["refused"]
+    actions = world.send(mavlink.MAVLink_command_long_message(0, 154, 1000, 0, 0, 0, 0, 0, 0, 0, 0))
+    assert (acks(actions), texts(actions)) == ([], ["command 1000 is for another component: refused"])
     assert world.send(mavlink.MAVLink_set_mode_message(9, 1, 4)) == []
+
+
+@pytest.mark.parametrize("target", [(0, 0), (1, 1), (7, 1)])
+def test_a_command_before_a_vehicle_was_heard_is_answered_from_whom_it_is_for(target: tuple[int, int]) -> None:
+    speaker = mavlink.MAVLink(None, 245, 190)
+    for message in (command_long(22), command_int(192, 6, x=0, y=0, z=0), command_long(32100, 1)):
+        message.target_system, message.target_component = target
+        frame = bytes(message.pack(speaker))
+        actions = without_vehicle(4, frame, pilot=False)
+        reader = mavlink.MAVLink(None)
+        text, ack = (reader.decode(bytearray(each.frame)) for each in actions if isinstance(each, ToClient))
+        assert {each.client for each in actions if isinstance(each, ToClient)} == {4}
+        assert text.text == "no vehicle was heard yet: ask again"
+        assert (ack.command, ack.result, ack.target_system, ack.target_component) == (message.command, 1, 245, 190)
+        assert (ack.get_srcSystem(), ack.get_srcComponent()) == (target[0] or 1, target[1] or 1)
+        asks_for_control = message.command == 32100
+        assert bool(without_vehicle(4, frame, pilot=True)) is asks_for_control, "the others went to the vehicle"
+    beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(speaker)
+    assert without_vehicle(4, bytes(beat), pilot=False) == without_vehicle(4, b"\xfd", pilot=False) == []
+
+
+YAW = "yaw is not flown: the autopilot turns the vehicle"
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "yaw", "wanted"),
+    [(PX4, nan, []), (PX4, 0.0, [YAW]), (PX4, 1.5, [YAW]), (ARDUPILOT, 0.0, []), (ARDUPILOT, 90.0, [YAW])],
+)
+def test_a_yaw_that_is_asked_for_is_told_once_of_each_client(autopilot: int, yaw: float, wanted: list[str]) -> None:
+    world = GatewayWorld(autopilot)
+    world.client(2, "script", rank=1)
+    world.client(3, "other", rank=2)
+    world.fly()
+    for client, said in ((1, wanted), (1, []), (2, []), (3, wanted)):
+        world.now_us += 1_000_000
+        message = reposition(latitude=NORTH[0] + 10 * client + world.now_us % 7, z=20.0, frame=6)
+        message.param4 = yaw
+        assert texts(world.send(message, client), client) == said
+
+
+def test_the_yaw_of_a_refused_step_is_not_told() -> None:
+    world = GatewayWorld()
+    world.fly()
+    message = reposition(z=550)
+    message.param4 = 0.5
+    assert texts(world.send(message)) == ["goto denied: altitude 62 m, accepted 40 m (integrity/argument-out-of-range)"]
+    message = reposition()
+    message.param4 = 0.5
+    assert texts(world.send(message)) == [YAW]
+
+
+@pytest.mark.parametrize(("mask", "wanted"), [(0xDF8, []), (0x9F8, [YAW]), (0x5F8, [YAW]), (0x1F8, [YAW])])
+def test_a_yaw_in_setpoints_is_told_once(mask: int, wanted: list[str]) -> None:
+    world = GatewayWorld()
+    world.fly()
+    world.offboard()
+    said = texts(world.send(setpoint(mask=mask)))
+    for number in range(40):
+        world.now_us += 100_000
+        said += texts(world.send(setpoint(latitude=NORTH[0] + 100 * number, mask=mask)))
+    assert said == wanted
+
+
+def test_a_yaw_that_a_skill_reads_is_not_told() -> None:
+    """A row of another library: `param4` is an argument."""
+    source = ArgumentSource("altitude", ("param4",), 1_000, "home", "")
+    row = AcceptedCommand("takeoff", COMMAND, "MAV_CMD_NAV_LOITER_UNLIM", 17, "", (), (source,))
+    world = GatewayWorld(more=(row,))
+    world.ready()
+    actions = world.send(command_long(17, 0, 0, 0, 10))
+    assert [each[0] for each in proposals(actions)] == ["takeoff"]
+    assert texts(actions) == []
 
 
 def test_long_texts_come_in_chunks_and_records_stay_short() -> None:

@@ -2,6 +2,7 @@ import re
 import statistics
 import time
 from math import nan
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -24,6 +25,7 @@ from rtshcua.decision.decide import decide
 from rtshcua.ground.analysis.plane import nearest_inside
 from rtshcua.ground.gateway import quick_decision
 from rtshcua.model.flat.zone import CIRCLE
+from virtual.gateway_clients import POLICY
 
 SCHOOL = {"latitude": 473_972_900, "longitude": 85_477_100}
 ABROAD = {"latitude": 473_990_000, "longitude": 85_700_000}
@@ -84,6 +86,26 @@ def test_a_target_in_an_area_without_room_is_refused_without_a_nearest_one() -> 
     tiny = msgspec.structs.replace(flat.zones[city], shape=CIRCLE, data=(0, 0, 500 * 500))
     assert nearest_inside(tiny, (9_000, 0), 1_000) is None
     assert nearest_inside(tiny, (9_000, 0), 100) == (400, 0)
+
+
+@pytest.mark.parametrize(
+    ("wind", "text"),
+    [
+        ((3_000,), "goto denied: wind.speed 3 m/s, accepted 0.999 m/s (authority/out-of-scope)"),
+        ((), "goto denied: wind.speed unknown, accepted 0.999 m/s (authority/out-of-scope)"),
+    ],
+)
+def test_wind_that_is_measured_is_told_with_its_limit(wind: tuple[int, ...], text: str, tmp_path: Path) -> None:
+    """The policy of the tests with programs of others, whose vehicles know no wind on the ground."""
+    (tmp_path / "rules.rts").write_text(POLICY.replace("HOUR", "10"))
+    world = GatewayWorld(under=policy(tmp_path / "rules.rts"))
+    world.client(1, "script", role="wind")
+    world.fly()
+    world.signals["wind.speed"] = wind
+    (said,) = texts(world.send(reposition()))
+    assert said == text
+    world.signals["wind.speed"] = (500,)
+    assert texts(world.send(reposition())) == []
 
 
 def test_a_role_that_may_not_is_named() -> None:

@@ -64,6 +64,18 @@ def test_an_orbit_goes_around_at_each_height_facing_inward() -> None:
         assert z0 == z1 or (x0, y0) == (x1, y1), "it climbs where a round ends"
 
 
+def test_an_orbit_at_one_height_faces_inward_too() -> None:
+    found = compiled(
+        ("from lowest to highest every step ", "at highest "), ("lowest = 12 m, ", ""), (", step = 6 m", ""),
+        ("  lowest:  altitude in 5 m .. 30 m,\n", ""), ("  step:    length in 1 m .. 20 m,\n", ""),
+    )  # fmt: skip
+    assert found.mission is not None, found.diagnostics
+    one, levelled_one = found.mission.invocations[1], orbit()[2]
+    assert one.plan.heights == ()
+    assert one.plan.headings == levelled_one.plan.headings[:17]
+    assert one.contract.motion.lowest == -1
+
+
 def test_its_motion_names_the_arguments_of_both_heights() -> None:
     motion = orbit()[2].contract.motion
     assert (motion.lowest, motion.altitude, motion.facing) == (1, 2, Facing.INWARD)

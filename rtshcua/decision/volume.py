@@ -53,7 +53,8 @@ class Planner:
     """The planned volumes of one plan. It caches the last start, because the result depends on nothing else."""
 
     __slots__ = (
-        "_altitude", "_distance", "_error", "_heights", "_kind", "_last", "_leg", "_levels", "_near", "_path", "_sweep"
+        "_altitude", "_distance", "_error", "_heights", "_kind", "_last", "_leg", "_levelled", "_levels", "_near",
+        "_path", "_sweep",
     )  # fmt: skip
 
     def __init__(
@@ -69,6 +70,7 @@ class Planner:
         self._error: Box = (-position_error, -position_error, position_error, position_error)
         self._sweep = Sweep(self._path, self._error) if self._path and not heights else None
         self._levels = levels(self._path, heights, self._error)
+        self._levelled: dict[tuple[int, int], PlaceSet] = {}
         self._distance = max((distance(*self._path[at : at + 2]) for at in range(0, len(self._path), 2)), default=0)
         self._leg: tuple[tuple[int, int, int, int], Sweep, Sweep, Span] | None = None
         self._last: tuple[tuple[Value, Value, Value], Volume] | None = None
@@ -100,12 +102,20 @@ class Planner:
             elif self._altitude is not None:
                 first = self._heights[0] if self._heights else self._altitude
                 low, high = min(low, first), max(high, first)
-            parts = [(leg, low, high), *self._levels]
+            parts = [(leg, low, high)]
             if self._heights:
                 low, high = min(low, *self._heights), max(high, *self._heights)
         if self._sweep is not None:
             parts.append((self._sweep, low, high))
-        return Volume(PlaceSet(tuple(parts), located, gap), (low, high, gap, None), farthest)
+        place = PlaceSet(tuple(parts), located, gap, self._fixed(located, gap) if self._heights else None)
+        return Volume(place, (low, high, gap, None), farthest)
+
+    def _fixed(self, located: int, gap: int) -> PlaceSet:
+        """The path at the heights of its points, which keeps its answers."""
+        fixed = self._levelled.get((located, gap))
+        if fixed is None:
+            fixed = self._levelled[located, gap] = PlaceSet(self._levels, located, gap)
+        return fixed
 
     def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Sweep, Span]:
         """The start, anywhere in a box; the leg from there to the path; and the distance from home of the farthest

@@ -215,6 +215,57 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
     return left
 
 
+def target_frame(autopilot: int, place: tuple[int, int], height: float, heading: float | None) -> bytes:
+    """A target at a place, mm above home, with a heading in 1/100 degree or along the leg."""
+    yaw = nan if heading is None else radians((heading + 18_000) % TURN / 100 - 180)
+    if autopilot == AUTOPILOTS[1]:
+        sea = (HOME_AMSL + height) / 1_000
+        return pack(m.MAVLink_command_int_message(SYSTEM, 1, 0, 192, 0, 0, -1.0, 1, 0, yaw, *place, sea))
+    mask, yaw = (0x0DF8, 0.0) if heading is None else (0x09F8, yaw)
+    return pack(
+        m.MAVLink_set_position_target_global_int_message(
+            0, SYSTEM, 1, 6, mask, *place, height / 1_000, 0, 0, 0, 0, 0, 0, yaw, 0
+        )
+    )
+
+
+def compare_levels(boundary: ctypes.CDLL, seed: int) -> int:
+    """Walk along a path with heights and headings, with many wrong frames; returns how many frames both passed."""
+    random = Random(seed)
+    here, there, home = FrameSession(), InC(boundary), random.choice(HOMES)
+    autopilot, now_us, left = random.choice(AUTOPILOTS), 1_000_000, 0
+    count = random.randrange(1, 6)
+    path = tuple(random.choice((0, 4_000, 60_000)) for _ in range(2 * count))
+    geo = tuple(part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(home, x, y))
+    heights = tuple(random.choice((5_000, 7_500, 8_000, 20_000)) for _ in range(count))
+    headings = tuple(random.choice((ALONG, *HEADINGS)) for _ in range(count)) if random.random() < 0.7 else ()
+    command = Command(7, "skill", MotionKind.COVER, path, geo, 20_000, 0, heights=heights, headings=headings)
+    here.open(replace(command, not_after_us=now_us))
+    there.open(command, home, now_us)
+    reports = [m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3)]
+    for number in range(count):
+        x, y = geo[2 * number : 2 * number + 2]
+        for height in (heights[number] + random.choice((0, 2_999, 3_001, -9_000)), heights[number]):
+            reports.append(m.MAVLink_global_position_int_message(0, x, y, HOME_AMSL + height, height, 0, 0, 0, 0))
+            for report in reports:
+                here.observe(pack(report, 1), now_us)
+                there.observe(pack(report, 1), now_us)
+            for _ in range(8):
+                of = min(max(number + random.choice((-1, 0, 0, 1, 1)), 0), count - 1)
+                wanted = None if command.heading_at(of) == ALONG else command.heading_at(of) + random.choice((0, 0, 1))
+                level = heights[random.choice((of, of, of, number))] + random.choice((0, 0, 2, 3))
+                frame = target_frame(autopilot, geo[2 * of : 2 * of + 2], level, wanted)
+                one, other = here.seal(frame, now_us), there.seal(frame, now_us)
+                assert other == (one.slug if isinstance(one, Refusal) else one), (seed, frame.hex())
+                left += not isinstance(one, Refusal)
+            reports.clear()
+    return left
+
+
+def test_paths_with_heights_and_headings_pass_alike(boundary: ctypes.CDLL) -> None:
+    assert sum(compare_levels(boundary, seed) for seed in range(SAMPLE)) > 2 * SAMPLE
+
+
 def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
     """One signed link of each; returns how many frames both accepted."""
     random = Random(seed)

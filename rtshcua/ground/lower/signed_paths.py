@@ -22,12 +22,13 @@ class PlannedPath(NamedTuple):
     """The path that the planner computes instead of a signed one.
 
     `points` is the number of its corners (0: no path), `length` its length in mm, and `apart` the Hausdorff distance of
-    the two paths in mm.
+    the two paths in mm. `levels`: the signed path has the same places in the same order, at other heights or headings.
     """
 
     points: int
     length: int
     apart: int
+    levels: bool = False
 
 
 def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | None:
@@ -43,6 +44,8 @@ def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | Non
         ways = [levelled(each, heights, inward=inward) for each in ((once, once[::-1]) if once else ())]
         if its in ways:
             return None
+        if signed in (way.points for way in ways):
+            return PlannedPath(len(signed), path_length(signed), 0, levels=True)
         found = ways[0].points if ways else None
     return PlannedPath(0, 0, 0) if found is None else PlannedPath(len(found), path_length(found), _apart(signed, found))
 

@@ -85,12 +85,15 @@ def test_the_planner_makes_the_signed_path() -> None:
     policy, _, one = orbit()
     assert path_planned_otherwise(policy, one) is None
     plan = one.plan
-    for changed in (
-        replace(plan, headings=(plan.headings[0] + 1, *plan.headings[1:])),
-        replace(plan, heights=(*plan.heights[:20], 13 * M, *plan.heights[21:])),
-        replace(plan, path=(plan.path[0] + 1, *plan.path[1:])),
+    for changed, levels in (
+        (replace(plan, headings=(plan.headings[0] + 1, *plan.headings[1:])), True),
+        (replace(plan, heights=(13 * M, *plan.heights[1:])), False),  # a fourth round
+        (replace(plan, heights=(*plan.heights[:20], 24 * M, *plan.heights[21:])), True),
+        (replace(plan, path=(plan.path[0] + 1, *plan.path[1:])), False),
     ):
-        assert path_planned_otherwise(policy, replace(one, plan=changed)) is not None
+        found = path_planned_otherwise(policy, replace(one, plan=changed))
+        assert found is not None
+        assert found.levels is levels
 
 
 @rows(

@@ -6,6 +6,8 @@
 EXPORT void rt_test_gate_begin(void);
 EXPORT void rt_test_gate_open(int64_t kind, int64_t altitude, int64_t speed, const uint8_t *path, uint32_t size, uint32_t count,
                               const int64_t *projection, int64_t not_after_us);
+EXPORT void rt_test_gate_levels(const uint8_t *heights, uint32_t heights_size, uint32_t heights_count, const uint8_t *headings,
+                                uint32_t headings_size, uint32_t headings_count);
 EXPORT void rt_test_gate_close(void);
 EXPORT void rt_test_gate_observe(const uint8_t *frame, uint32_t size, int64_t now_us);
 EXPORT const char *rt_test_gate_seal(const uint8_t *frame, uint32_t size, int64_t now_us, uint8_t *out, uint32_t *sealed);
@@ -19,6 +21,7 @@ EXPORT int64_t rt_test_link_signed_up_to(void);
 
 static rt_gate gate;
 static rt_command last; /* the command that it was opened for */
+static rt_list heights, headings;
 static rt_chain chain;
 static rt_signed_link link;
 
@@ -29,10 +32,18 @@ void rt_test_gate_begin(void) {
 
 void rt_test_gate_open(int64_t kind, int64_t altitude, int64_t speed, const uint8_t *path, uint32_t size, uint32_t count,
                        const int64_t *projection, int64_t not_after_us) {
-    rt_command command = {1, kind, altitude, speed, {path, path + size, count}, false, {0, 0},
-                          {projection[0], projection[1], projection[2], projection[3]}};
+    rt_command command = {.token = 1, .kind = kind, .altitude = altitude, .speed = speed, .path = {path, path + size, count},
+                          .heights = heights, .headings = headings,
+                          .projection = {projection[0], projection[1], projection[2], projection[3]}};
     last = command;
     rt_gate_open(&gate, &command, not_after_us);
+}
+
+/* Of the command that it is opened for next. */
+void rt_test_gate_levels(const uint8_t *heights_at, uint32_t heights_size, uint32_t heights_count, const uint8_t *headings_at,
+                         uint32_t headings_size, uint32_t headings_count) {
+    heights = (rt_list){heights_at, heights_at + heights_size, heights_count};
+    headings = (rt_list){headings_at, headings_at + headings_size, headings_count};
 }
 
 void rt_test_gate_close(void) { rt_gate_close(&gate); }

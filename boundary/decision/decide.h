@@ -60,15 +60,17 @@ typedef struct {
     rt_scratch scratch;
 } rt_prepared_policy;
 
-/* Where a skill flies (volume.py): along a path of points, at an altitude if it has one. */
+/* Where a skill flies (volume.py): along a path of points, at an altitude if it has one, or at the height of each point. */
 typedef struct {
     int64_t kind, altitude;
     bool has_altitude;
     uint32_t points;
     int64_t x, y; /* the first point */
-    rt_list path; /* all of them, where there are more than one */
+    rt_list path; /* all of them, where there are more than one, or they have heights */
+    rt_list heights; /* of each point; empty if all are at the altitude */
+    int64_t first, low, high; /* the first, the least and the greatest of them, or the altitude */
     int64_t farthest; /* the greatest square of a distance from home on it */
-    uint8_t *along; /* cached results of the path, by zone: 0 if there is none; NULL without a cache */
+    uint8_t *along; /* cached results of the path, with its heights if it has them, by zone: 0 if there is none; NULL without a cache */
 } rt_planner;
 
 typedef struct {

@@ -42,7 +42,7 @@ typedef struct {
     int64_t x, y, error;
     bool located, level; /* whether its start and its height are known */
     bool climbs; /* the start, before the leg: heights start_low..high */
-    int64_t start_low, leg_low, low, high; /* heights on the leg: leg_low..high; on the path: low..high */
+    int64_t start_low, leg_low, leg_high, low, high; /* heights on the leg: leg_low..leg_high; on the path, and in all: low..high */
 } rt_volume;
 
 void rt_plan_link(const rt_policy *policy, const rt_link *link, rt_planner *planner);

@@ -10,6 +10,7 @@ static void plan(const rt_policy *policy, const rt_motion *motion, int64_t altit
     planner->has_altitude = motion->kind == RT_HOME || motion->altitude != -1;
     planner->altitude = motion->kind == RT_HOME ? policy->vehicle.return_altitude : altitude;
     planner->along = NULL;
+    planner->first = planner->low = planner->high = planner->altitude;
     if (planner->kind == RT_HOME) {
         planner->x = planner->y = 0;
         planner->points = 1;
@@ -36,6 +37,12 @@ void rt_plan_step(const rt_policy *policy, const rt_invocation *invocation, rt_p
     *planner = (rt_planner){.kind = invocation->plan.kind, .points = path.count / 2, .path = path};
     if (rt_next_int(&path, &planner->x)) rt_next_int(&path, &planner->y);
     plan(policy, &invocation->contract.motion, invocation->plan.altitude, planner);
+    rt_list heights = planner->heights = invocation->plan.heights;
+    if (rt_next_int(&heights, &planner->first)) planner->low = planner->high = planner->first;
+    while (rt_next_int(&heights, &x)) {
+        planner->low = rt_min(planner->low, x);
+        planner->high = rt_max(planner->high, x);
+    }
     while (rt_next_int(&path, &x) && rt_next_int(&path, &y)) planner->farthest = rt_max(planner->farthest, x * x + y * y);
 }
 
@@ -44,7 +51,7 @@ rt_volume rt_here(const rt_situation *situation) {
     bool positioned = vehicle->position != -1;
     rt_value x = rt_slot(situation, vehicle->position), y = rt_slot(situation, positioned ? vehicle->position + 1 : -1);
     rt_value height = rt_slot(situation, vehicle->height);
-    return (rt_volume){NULL, x.value, y.value, 0, x.known && y.known, height.known, false, 0, height.value, height.value, height.value};
+    return (rt_volume){NULL, x.value, y.value, 0, x.known && y.known, height.known, false, 0, height.value, height.value, height.value, height.value};
 }
 
 /* The least height at which a return flies home: `across`. Near home it may climb less, or not at all. */
@@ -65,15 +72,21 @@ rt_volume rt_plan_volume(const rt_situation *situation, const rt_planner *planne
         volume.start_low = volume.low;
         volume.climbs = volume.leg_low != volume.start_low;
         volume.low = rt_min(volume.low, 0); /* there, it descends */
+        volume.leg_high = volume.high;
         return volume;
     }
     if (planner->kind == RT_LAND) {
         volume.low = rt_min(volume.low, 0);
     } else if (planner->has_altitude) {
-        volume.low = rt_min(volume.low, planner->altitude);
-        volume.high = rt_max(volume.high, planner->altitude);
+        volume.low = rt_min(volume.low, planner->first);
+        volume.high = rt_max(volume.high, planner->first);
     }
     volume.leg_low = volume.low;
+    volume.leg_high = volume.high;
+    if (planner->heights.count > 0) {
+        volume.low = rt_min(volume.low, planner->low);
+        volume.high = rt_max(volume.high, planner->high);
+    }
     return volume;
 }
 

@@ -49,10 +49,40 @@ static rt_truth between(const rt_zone *zone, int64_t low, int64_t high, bool kno
     return high <= zone->floor || low >= zone->ceiling ? RT_FALSE : RT_MIXED;
 }
 
+/* Whether the legs of a path whose points have heights of their own are inside: each is at the heights between those of its ends. */
+static rt_truth along_levels(const rt_prepared_policy *policy, uint32_t number, const rt_volume *volume) {
+    const rt_planner *planner = volume->planner;
+    const rt_zone *zone = &RT_AT(policy->policy->zones, number);
+    uint8_t *known = planner->along && volume->level && volume->located ? &planner->along[number % RT_MAX_ZONES] : NULL;
+    if (known && *known) return *known;
+    rt_list path = planner->path, heights = planner->heights;
+    rt_volume leg = {.error = volume->error};
+    int64_t height = 0, to_height;
+    rt_truth truth = 0;
+    rt_next_int(&path, &leg.x);
+    rt_next_int(&path, &leg.y);
+    rt_next_int(&heights, &height);
+    do {
+        rt_planner to = {.points = 1, .x = leg.x, .y = leg.y};
+        bool leads = rt_next_int(&path, &to.x) && rt_next_int(&path, &to.y); /* not from the only point of a path */
+        to_height = height;
+        rt_next_int(&heights, &to_height);
+        leg.planner = leads ? &to : NULL;
+        rt_truth vertical = between(zone, rt_min(height, to_height), rt_max(height, to_height), volume->level);
+        if (vertical == RT_FALSE) truth |= RT_FALSE;
+        else truth |= rt_and(vertical, volume->located ? along_leg(policy, number, &leg) : RT_UNKNOWN);
+        leg.x = to.x;
+        leg.y = to.y;
+        height = to_height;
+    } while (path.count > 0);
+    if (known) *known = (uint8_t)truth;
+    return truth;
+}
+
 rt_truth rt_zone_holds(const rt_situation *situation, uint32_t number, const rt_volume *volume, int64_t through_us) {
     const rt_prepared_policy *policy = situation->policy;
     const rt_zone *zone = &RT_AT(policy->policy->zones, number);
-    rt_truth truth = 0, vertical = between(zone, volume->leg_low, volume->high, volume->level);
+    rt_truth truth = 0, vertical = between(zone, volume->leg_low, volume->leg_high, volume->level);
     if (vertical == RT_FALSE) truth = RT_FALSE;
     else truth = rt_and(vertical, volume->located ? along_leg(policy, number, volume) : RT_UNKNOWN);
     if (volume->climbs) {
@@ -62,7 +92,9 @@ rt_truth rt_zone_holds(const rt_situation *situation, uint32_t number, const rt_
         if (vertical == RT_FALSE) truth |= RT_FALSE;
         else truth |= rt_and(vertical, volume->located ? along_leg(policy, number, &start) : RT_UNKNOWN);
     }
-    if (volume->planner && volume->planner->points) {
+    if (volume->planner && volume->planner->heights.count > 0) {
+        truth |= along_levels(policy, number, volume);
+    } else if (volume->planner && volume->planner->points) {
         vertical = between(zone, volume->low, volume->high, volume->level);
         if (vertical == RT_FALSE) truth |= RT_FALSE;
         else truth |= rt_and(vertical, volume->located ? along_path(policy, number, volume) : RT_UNKNOWN);

@@ -6,6 +6,7 @@
 #define DATUM_MOVES 2000 /* mm */
 #define ROUNDING 2       /* mm, mm/s */
 #define NEAR 449         /* 1e-7 degree of latitude */
+#define YAW_ROUNDING 100 /* 1e-6 radian */
 
 static const uint32_t parameters[] = {
     RT_COMMAND_LONG_PARAM1, RT_COMMAND_LONG_PARAM2, RT_COMMAND_LONG_PARAM3, RT_COMMAND_LONG_PARAM4,
@@ -121,7 +122,7 @@ bool rt_is_forced_arming(const rt_frame *frame) {
 
 static bool is_about(uint32_t metres, int64_t millimetres, int64_t within) {
     int64_t found = 0;
-    if (!rt_thousandfold(metres, &found))
+    if (!rt_multiplied(metres, 1000, &found))
         return false;
     return found - millimetres <= within && millimetres - found <= within;
 }
@@ -132,10 +133,35 @@ static bool is_speed(uint32_t metres_per_second, const rt_command *command) {
     return command->speed > 0 && is_about(metres_per_second, command->speed, ROUNDING);
 }
 
-static bool is_point(rt_point there, const rt_command *command) {
-    rt_point point;
-    for (int64_t at = 0; at < RT_MAX_PATH && rt_point_at(command, at, &point.latitude, &point.longitude); at++)
-        if (point.latitude == there.latitude && point.longitude == there.longitude)
+/* Whether a yaw in radians, from -pi to pi, is a heading in 1/100 degree. */
+static bool is_heading(uint32_t yaw, int64_t heading) {
+    int64_t found = 0, turned = heading <= RT_FULL_TURN / 2 ? heading : heading - RT_FULL_TURN;
+    int64_t wanted = rt_floor(turned * 1745329252, 10000000); /* 1e-6 radian */
+    return rt_multiplied(yaw, 1000000, &found) && found - wanted <= YAW_ROUNDING && wanted - found <= YAW_ROUNDING;
+}
+
+bool rt_leads_to(const rt_frame *frame, const rt_waypoint *point, bool home_known, int64_t home_amsl) {
+    rt_point there = {0, 0};
+    bool along = point->heading == RT_ALONG;
+    if (!rt_point_of(frame, &there) || there.latitude != point->latitude || there.longitude != point->longitude)
+        return false;
+    if (frame->message == RT_MSG_COMMAND_INT) {
+        uint32_t yaw = rt_u32(frame, RT_COMMAND_INT_PARAM4);
+        return home_known && is_about(rt_u32(frame, RT_COMMAND_INT_Z), home_amsl + point->height, DATUM_MOVES) &&
+               (along ? rt_is_nan(yaw) : is_heading(yaw, point->heading));
+    }
+    uint32_t mask = rt_u16(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_TYPE_MASK);
+    return is_about(rt_u32(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_ALT), point->height, ROUNDING) &&
+           (along ? mask == RT_POSITION_ONLY
+                  : mask == RT_POSITION_AND_YAW &&
+                        is_heading(rt_u32(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_YAW), point->heading));
+}
+
+static bool leads_there(const rt_frame *frame, const rt_command *command, bool home_known, int64_t home_amsl) {
+    rt_way way = rt_way_of(command);
+    rt_waypoint point = {0, 0, 0, 0};
+    while (rt_next_waypoint(command, &way, &point))
+        if (rt_leads_to(frame, &point, home_known, home_amsl))
             return true;
     return false;
 }
@@ -202,25 +228,18 @@ static bool is_stop(const rt_frame *frame) {
            rt_is_zero(rt_u32(frame, RT_COMMAND_INT_PARAM3));
 }
 
-/* A circle's radius, or a heading of its own, would be another manoeuvre. */
+/* A circle's radius would be another manoeuvre. */
 static bool repositions(const rt_frame *frame, const rt_command *command, bool home_known, int64_t home_amsl) {
     uint32_t speed = rt_u32(frame, RT_COMMAND_INT_PARAM1);
-    rt_point there = {rt_i32(frame, RT_COMMAND_INT_X), rt_i32(frame, RT_COMMAND_INT_Y)};
-    return is_reposition(frame) && travels(command) && home_known &&
-           is_about(rt_u32(frame, RT_COMMAND_INT_Z), home_amsl + command->altitude, DATUM_MOVES) &&
-           rt_is_nan(rt_u32(frame, RT_COMMAND_INT_PARAM4)) && rt_is_zero(rt_u32(frame, RT_COMMAND_INT_PARAM3)) &&
-           (command->speed != 0 ? is_speed(speed, command) : rt_is_whole(speed, -1)) && is_point(there, command);
+    return is_reposition(frame) && travels(command) && rt_is_zero(rt_u32(frame, RT_COMMAND_INT_PARAM3)) &&
+           (command->speed != 0 ? is_speed(speed, command) : rt_is_whole(speed, -1)) &&
+           leads_there(frame, command, home_known, home_amsl);
 }
 
 /* Fields that the mask excludes may have any value. */
 static bool targets(const rt_frame *frame, const rt_command *command) {
-    rt_point there = {
-        rt_i32(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_LAT_INT), rt_i32(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_LON_INT)};
-    return rt_u16(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_TYPE_MASK) == RT_POSITION_ONLY &&
-           frame->payload[RT_SET_POSITION_TARGET_GLOBAL_INT_COORDINATE_FRAME] == RT_MAV_FRAME_GLOBAL_RELATIVE_ALT_INT &&
-           travels(command) &&
-           is_about(rt_u32(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_ALT), command->altitude, ROUNDING) &&
-           is_point(there, command);
+    return frame->payload[RT_SET_POSITION_TARGET_GLOBAL_INT_COORDINATE_FRAME] == RT_MAV_FRAME_GLOBAL_RELATIVE_ALT_INT &&
+           travels(command) && leads_there(frame, command, false, 0);
 }
 
 bool rt_carries_out(const rt_frame *frame, const rt_command *command, uint8_t autopilot, bool home_known, int64_t home_amsl) {

@@ -30,5 +30,7 @@ bool rt_carries_out(const rt_frame *frame, const rt_command *command, uint8_t au
 /* The target of a frame that carries out a command; false if the vehicle stays where it is. */
 bool rt_point_of(const rt_frame *frame, rt_point *point);
 bool rt_is_near(rt_point here, rt_point point);
+/* Whether place, height and heading in a frame that carries out a command are those of this point. */
+bool rt_leads_to(const rt_frame *frame, const rt_waypoint *point, bool home_known, int64_t home_amsl);
 
 #endif

@@ -13,17 +13,30 @@ void rt_unproject(const rt_projection *projection, int64_t x, int64_t y, int64_t
         *longitude = rt_east_of(*longitude, 0);
 }
 
-bool rt_point_at(const rt_command *command, int64_t number, int64_t *latitude, int64_t *longitude) {
+rt_way rt_way_of(const rt_command *command) {
+    return (rt_way){command->path, command->heights, command->headings, command->has_place};
+}
+
+bool rt_next_waypoint(const rt_command *command, rt_way *way, rt_waypoint *point) {
     int64_t x = command->place[0], y = command->place[1];
-    if (number < 0 || number >= (command->has_place ? 1 : (int64_t)command->path.count / 2))
+    if (!way->has_place && (!rt_next_int(&way->path, &x) || !rt_next_int(&way->path, &y)))
         return false;
-    if (!command->has_place) {
-        rt_list left = command->path;
-        for (int64_t at = 0; at <= number; at++) {
-            rt_next_int(&left, &x);
-            rt_next_int(&left, &y);
-        }
-    }
-    rt_unproject(&command->projection, x, y, latitude, longitude);
+    if (way->has_place)
+        way->path.count = 0;
+    way->has_place = false;
+    point->height = command->altitude;
+    point->heading = RT_ALONG;
+    rt_next_int(&way->heights, &point->height);
+    rt_next_int(&way->headings, &point->heading);
+    rt_unproject(&command->projection, x, y, &point->latitude, &point->longitude);
     return true;
+}
+
+bool rt_waypoint_at(const rt_command *command, int64_t number, rt_waypoint *point) {
+    rt_way way = rt_way_of(command);
+    bool found = false;
+    for (int64_t at = 0; at <= number; at++)
+        if (!(found = rt_next_waypoint(command, &way, point)))
+            break;
+    return found;
 }

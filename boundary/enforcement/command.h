@@ -4,11 +4,12 @@
 
 #include "model/flat.h"
 
-/* `path` is x0, y0, ... in local mm. If `has_place`, it is the single point `place`. Altitude mm above home, speed mm/s. */
+/* `path` is x0, y0, ... in local mm. If `has_place`, it is the single point `place`. Altitude mm above home, speed mm/s. `heights` and
+   `headings` have one for each point, or are empty. */
 typedef struct {
     uint64_t token;
     int64_t kind, altitude, speed;
-    rt_list path;
+    rt_list path, heights, headings;
     bool has_place;
     int64_t place[2];
     rt_projection projection;
@@ -20,7 +21,20 @@ void rt_unproject(const rt_projection *projection, int64_t x, int64_t y, int64_t
 /* The longitude relative to another one, at most 180 degrees: `meridian` of model/flat/zone.py, minus the other. */
 int64_t rt_east_of(int64_t longitude, int64_t other);
 
-/* A point of the path, in 1e-7 degree; false if there is none of this number. */
-bool rt_point_at(const rt_command *command, int64_t number, int64_t *latitude, int64_t *longitude);
+/* A point of the path: 1e-7 degree, mm above home, and the heading of the nose in 1/100 degree, or RT_ALONG. */
+typedef struct {
+    int64_t latitude, longitude, height, heading;
+} rt_waypoint;
+
+/* The points of a path in order: `rt_next_waypoint` takes the first that is left. */
+typedef struct {
+    rt_list path, heights, headings;
+    bool has_place;
+} rt_way;
+
+rt_way rt_way_of(const rt_command *command);
+bool rt_next_waypoint(const rt_command *command, rt_way *way, rt_waypoint *point);
+/* The point of this number; false if there is none. */
+bool rt_waypoint_at(const rt_command *command, int64_t number, rt_waypoint *point);
 
 #endif

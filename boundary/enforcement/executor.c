@@ -65,6 +65,8 @@ static bool command_of(const rt_executor *executor, const rt_permit *permit, rt_
         command->altitude = invocation.plan.altitude;
         command->speed = invocation.plan.speed;
         command->path = invocation.plan.path;
+        command->heights = invocation.plan.heights;
+        command->headings = invocation.plan.headings;
         return true;
     }
     int64_t rule = -1 - permit->link, number = permit->link;

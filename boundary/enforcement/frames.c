@@ -3,6 +3,7 @@
 
 #define HOME_MOVES 10000    /* mm */
 #define STANDS_US 3000000LL /* us */
+#define NEAR_LEVEL 3000     /* mm */
 
 void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us) {
     gate->open = gate->started = true;
@@ -61,8 +62,8 @@ void rt_gate_observe(rt_gate *gate, rt_bytes octets, int64_t now_us) {
         gate->here_known = true;
         gate->here.latitude = rt_i32(&heard, RT_GLOBAL_POSITION_INT_LAT);
         gate->here.longitude = rt_i32(&heard, RT_GLOBAL_POSITION_INT_LON);
-        int64_t home = (int64_t)rt_i32(&heard, RT_GLOBAL_POSITION_INT_ALT) -
-                       rt_i32(&heard, RT_GLOBAL_POSITION_INT_RELATIVE_ALT);
+        gate->above_home = rt_i32(&heard, RT_GLOBAL_POSITION_INT_RELATIVE_ALT);
+        int64_t home = (int64_t)rt_i32(&heard, RT_GLOBAL_POSITION_INT_ALT) - gate->above_home;
         int64_t moved = home - gate->settled_amsl;
         if (!gate->settled_known || (moved <= HOME_MOVES && moved >= -HOME_MOVES)) {
             gate->home_known = true;
@@ -89,8 +90,15 @@ static bool is_prepared(const rt_gate *gate, const rt_setting *setting, int64_t 
     return false;
 }
 
+/* Whether the vehicle is close enough to a point of the path for the next leg to begin. */
+static bool is_at(const rt_gate *gate, const rt_waypoint *point) {
+    bool level = gate->command.heights.count == 0 || rt_within(gate->above_home - point->height, -NEAR_LEVEL, NEAR_LEVEL);
+    return level && gate->here_known && rt_is_near(gate->here, (rt_point){point->latitude, point->longitude});
+}
+
 static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t now_us) {
-    rt_point point = {0, 0}, last = {0, 0}, next = {0, 0};
+    rt_point point = {0, 0};
+    rt_waypoint last = {0, 0, 0, 0}, next = {0, 0, 0, 0};
     if (!gate->open)
         return "frame/no-session";
     if (!rt_carries_out(frame, &gate->command, gate->autopilot, gate->home_known, gate->home_amsl))
@@ -98,12 +106,12 @@ static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t no
     if (!gate->begun && now_us > gate->not_after_us)
         return "frame/late";
     if (rt_point_of(frame, &point)) {
-        bool has_last = rt_point_at(&gate->command, gate->leg, &last.latitude, &last.longitude);
-        bool there = !has_last || (gate->here_known && rt_is_near(gate->here, last)); /* else it would cut the corner */
-        bool has_next = rt_point_at(&gate->command, gate->leg + 1, &next.latitude, &next.longitude);
-        if (has_last && last.latitude == point.latitude && last.longitude == point.longitude) {
+        bool has_last = rt_waypoint_at(&gate->command, gate->leg, &last);
+        bool there = !has_last || is_at(gate, &last); /* else it would cut the corner */
+        bool has_next = rt_waypoint_at(&gate->command, gate->leg + 1, &next);
+        if (has_last && rt_leads_to(frame, &last, gate->home_known, gate->home_amsl)) {
             /* or once more to the present target */
-        } else if (there && has_next && next.latitude == point.latitude && next.longitude == point.longitude) {
+        } else if (there && has_next && rt_leads_to(frame, &next, gate->home_known, gate->home_amsl)) {
             gate->leg++;
         } else {
             return "frame/out-of-order";
@@ -171,7 +179,8 @@ rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *
 /* Why a frame is not signed ahead for a command: the rules of the gate, as if it were open for the command. */
 static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, rt_bytes octets) {
     rt_frame frame;
-    rt_point point = {0, 0}, first = {0, 0};
+    rt_point point = {0, 0};
+    rt_waypoint first = {0, 0, 0, 0};
     if (!rt_read_frame(octets, &frame))
         return "frame/not-one-frame";
     if (gate->system == 0)
@@ -183,8 +192,8 @@ static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, r
         return "frame/not-covered";
     if (!rt_point_of(&frame, &point))
         return NULL;
-    bool is_first = rt_point_at(command, 0, &first.latitude, &first.longitude) && point.latitude == first.latitude &&
-                    point.longitude == first.longitude; /* the others wait until the vehicle is there */
+    bool is_first = rt_waypoint_at(command, 0, &first) &&
+                    rt_leads_to(&frame, &first, gate->home_known, gate->home_amsl); /* the others wait until the vehicle is there */
     return is_first ? NULL : "frame/out-of-order";
 }
 

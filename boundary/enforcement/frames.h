@@ -18,6 +18,7 @@ typedef struct {
     int64_t leg;          /* the last point of its path that was sent, -1 before */
     bool here_known;
     rt_point here;
+    int64_t above_home; /* mm */
     bool let_out; /* a frame was sent or signed ahead since the last permit */
     bool started; /* a session was opened: fences are no longer changed */
     uint8_t system, autopilot, kind; /* of its heartbeat */

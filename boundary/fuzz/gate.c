@@ -27,6 +27,10 @@ static void permit(rt_bytes record, int64_t now_us) {
         command.place[command.path.count++ % 2] = value;
         command.path.end = cursor.at;
     }
+    if ((record.at[0] & 32) != 0) { /* coordinates are heights and headings too: the checks ensure their bounds, the gate needs none */
+        command.heights = command.headings = command.path;
+        command.heights.count = command.headings.count = command.path.count / 2;
+    }
     rt_gate_open(&gate, &command, now_us + 1000000);
 }
 

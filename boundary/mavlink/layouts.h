@@ -229,6 +229,7 @@ static const rt_layout rt_layouts[] = {
 #define RT_MAV_MISSION_TYPE_FENCE 1
 #define RT_MAV_MISSION_TYPE_RALLY 2
 #define RT_POSITION_ONLY 3576
+#define RT_POSITION_AND_YAW 2552
 #define RT_NO_PLACE 2147483647
 #define RT_VEHICLES UINT64_C(0xe80833fbff9f)
 #define RT_PX4_MANUAL {1, 0}

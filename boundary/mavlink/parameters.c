@@ -39,15 +39,15 @@ bool rt_is_whole(uint32_t bits, int64_t value) {
     return exponent > -24 ? (mantissa & ((1ULL << -exponent) - 1)) == 0 : mantissa == 0;
 }
 
-bool rt_thousandfold(uint32_t bits, int64_t *value) {
+bool rt_multiplied(uint32_t bits, uint32_t factor, int64_t *value) {
     int exponent;
-    uint64_t product = mantissa_of(bits, &exponent) * 1000; /* below 2**34 */
+    uint64_t product = mantissa_of(bits, &exponent) * factor; /* below 2**44 */
     if (!rt_is_finite(bits) || exponent > 16)
         return false;
     uint64_t size = 0;
     if (exponent >= 0) {
         size = product << exponent;
-    } else if (exponent > -36) {
+    } else if (exponent > -46) {
         uint64_t rest = product & ((1ULL << -exponent) - 1), half = 1ULL << (-exponent - 1);
         size = product >> -exponent;
         if (rest > half || (rest == half && (size & 1) != 0))

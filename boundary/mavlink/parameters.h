@@ -11,8 +11,8 @@ bool rt_lies_within(uint32_t bits, int32_t first, int32_t last); /* a number in 
 bool rt_is_whole(uint32_t bits, int64_t value); /* whether it is exactly this integer */
 /* The integer part; false for a value beyond 2**62, or not a number. */
 bool rt_cut(uint32_t bits, int64_t *value);
-/* 1,000 times the value, to the nearest integer, ties to even; false beyond 2**50, or not a number. */
-bool rt_thousandfold(uint32_t bits, int64_t *value);
+/* The value times a factor up to 10**6, to the nearest integer, ties to even; false from 2**40 on, or not a number. */
+bool rt_multiplied(uint32_t bits, uint32_t factor, int64_t *value);
 /* The value of a PARAM_SET or PARAM_VALUE, as the bits of the nearest float; false if it is not a number. */
 bool rt_bits_of(uint32_t raw, uint8_t kind, bool bytewise, uint32_t *bits);
 

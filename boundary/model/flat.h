@@ -68,8 +68,10 @@ typedef struct {
     int64_t source, start, end;
 } rt_link;
 
+enum { RT_ALONG_LEGS = 0, RT_INWARD = 1 };
+
 typedef struct {
-    int64_t kind, altitude, speed, time;
+    int64_t kind, altitude, speed, time, lowest, facing;
 } rt_motion;
 
 typedef struct {
@@ -192,10 +194,14 @@ typedef struct {
 } rt_policy;
 
 /* mission.py */
+#define RT_ALONG (-1)
+#define RT_FULL_TURN 36000
+
 typedef struct {
     int64_t kind;
     rt_list path; /* integers */
     int64_t altitude, speed;
+    rt_list heights, headings; /* integers, one for each point, or empty */
 } rt_plan;
 
 typedef struct {

@@ -13,7 +13,7 @@ int main(void) {
     int64_t number;
     uint32_t count;
     bool truth;
-    switch (Frama_C_interval(0, 9)) {
+    switch (Frama_C_interval(0, 10)) {
     case 0: return rt_cbor_valid((rt_bytes){input, size}, Frama_C_unsigned_int_interval(0, UINT32_MAX));
     case 1: return rt_take_int(&cursor, &number);
     case 2: return rt_take_octets(&cursor, &string);
@@ -23,6 +23,7 @@ int main(void) {
     case 6: return rt_take_bool(&cursor, &truth);
     case 7: return rt_take_null(&cursor);
     case 8: return rt_take_struct(&cursor, 3);
+    case 9: return rt_take_extended(&cursor, 4, 6, &count);
     default: break;
     }
     uint8_t out[RT_HEAD_BYTES];

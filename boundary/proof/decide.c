@@ -64,7 +64,8 @@ static rt_contract contract_of(void) {
     rt_contract one;
     ANY(one);
     one.parameters = list_at(octets);
-    one.motion = (rt_motion){WITHIN(RT_HOLD, RT_LAND), WITHIN(-1, RT_MAX_CELLS - 1), WITHIN(-1, RT_MAX_CELLS - 1), WITHIN(-1, RT_MAX_CELLS - 1)};
+    one.motion = (rt_motion){WITHIN(RT_HOLD, RT_LAND), WITHIN(-1, RT_MAX_CELLS - 1), WITHIN(-1, RT_MAX_CELLS - 1), WITHIN(-1, RT_MAX_CELLS - 1),
+                              WITHIN(-1, RT_MAX_CELLS - 1), WITHIN(RT_ALONG_LEGS, RT_INWARD)};
     one.timing_class = WITHIN(RT_SEMANTIC, RT_REFLEX);
     one.deadline_us = WITHIN(0, RT_MAX_DURATION), one.validity_us = WITHIN(0, RT_MAX_DURATION);
     one.duration_us = WITHIN(0, RT_MAX_DURATION), one.grace_us = WITHIN(0, RT_MAX_DURATION);
@@ -170,6 +171,8 @@ static void invocation_of(void) {
     planner->points = SIZE(RT_MAX_PATH);
     planner->x = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE), planner->y = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
     planner->path = list_at(path);
+    planner->heights = list_at(path);
+    planner->first = WITHIN(RT_LOWEST, RT_HIGHEST), planner->low = WITHIN(RT_LOWEST, RT_HIGHEST), planner->high = WITHIN(RT_LOWEST, RT_HIGHEST);
     planner->farthest = WITHIN(0, 2 * RT_MAX_COORDINATE * RT_MAX_COORDINATE);
 }
 

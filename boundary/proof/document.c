@@ -68,7 +68,7 @@ rt_refusal rt_read_policy(rt_bytes payload, rt_policy *policy) {
 void rt_read_invocation(rt_bytes raw, rt_invocation *invocation) {
     ANY(*invocation);
     invocation->raw = invocation->content = invocation->invocation_id = invocation->text = invocation->binding = text();
-    invocation->arguments = invocation->plan.path = list();
+    invocation->arguments = invocation->plan.path = invocation->plan.heights = invocation->plan.headings = list();
     invocation->contract = contract();
 }
 

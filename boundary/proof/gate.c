@@ -26,6 +26,8 @@ static void begin(rt_command *command) {
     command->altitude = WITHIN(RT_LOWEST, RT_HIGHEST);
     command->speed = WITHIN(0, RT_MAX_SPEED);
     command->path = (rt_list){path, path + sizeof path, SIZE(2 * RT_MAX_PATH)};
+    command->heights = (rt_list){path, path + sizeof path, SIZE(RT_MAX_PATH)};
+    command->headings = (rt_list){path, path + sizeof path, SIZE(RT_MAX_PATH)};
     command->has_place = EITHER();
     command->place[0] = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
     command->place[1] = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
@@ -37,6 +39,7 @@ static void begin(rt_command *command) {
     gate.armed = EITHER(), gate.types_known = EITHER(), gate.home_known = EITHER(), gate.settled_known = EITHER();
     gate.leg = WITHIN(-1, RT_MAX_PATH);
     gate.here = (rt_point){WITHIN(INT32_MIN, INT32_MAX), WITHIN(INT32_MIN, INT32_MAX)};
+    gate.above_home = WITHIN(INT32_MIN, INT32_MAX);
     gate.home_amsl = WITHIN(-(1LL << 32), 1LL << 32);
     gate.settled_amsl = WITHIN(-(1LL << 32), 1LL << 32);
     gate.prepared_count = SIZE(RT_MAX_WRITES);

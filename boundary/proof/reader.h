@@ -37,6 +37,11 @@ bool rt_take_array(rt_cursor *cursor, uint32_t *count) {
     return taken(cursor);
 }
 
+bool rt_take_extended(rt_cursor *cursor, uint32_t least, uint32_t most, uint32_t *fields) {
+    *fields = least + SIZE(most - least);
+    return taken(cursor);
+}
+
 bool rt_take_map(rt_cursor *cursor, uint32_t *count) { return rt_take_array(cursor, count); }
 
 bool rt_take_bool(rt_cursor *cursor, bool *value) {

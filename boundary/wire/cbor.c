@@ -145,6 +145,10 @@ bool rt_take_struct(rt_cursor *cursor, uint32_t fields) {
     return rt_take_array(cursor, &count) && count == fields;
 }
 
+bool rt_take_extended(rt_cursor *cursor, uint32_t least, uint32_t most, uint32_t *fields) {
+    return rt_take_array(cursor, fields) && *fields >= least && *fields <= most;
+}
+
 uint32_t rt_cbor_head(uint8_t out[RT_HEAD_BYTES], uint8_t major, uint64_t argument) {
     uint8_t info = argument < 24 ? (uint8_t)argument : argument < 1u << 8 ? 24 : argument < 1u << 16 ? 25 : argument < (uint64_t)1 << 32 ? 26 : 27;
     uint32_t width = info < 24 ? 0 : 1u << (info - 24);

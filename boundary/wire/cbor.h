@@ -27,6 +27,8 @@ bool rt_take_null(rt_cursor *cursor); /* leaves the cursor where it is if the ne
 
 /* An array of exactly this many items. */
 bool rt_take_struct(rt_cursor *cursor, uint32_t fields);
+/* An array of `least` to `most` items: the last fields of a record are left out if they have their defaults. */
+bool rt_take_extended(rt_cursor *cursor, uint32_t least, uint32_t most, uint32_t *fields);
 
 #define RT_HEAD_BYTES 9
 enum { RT_MAJOR_INT = 0, RT_MAJOR_OCTETS = 2, RT_MAJOR_TEXT = 3, RT_MAJOR_ARRAY = 4 };

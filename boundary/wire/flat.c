@@ -60,10 +60,32 @@ static LIST(clauses, rt_clause, clause)
 static LIST(links, rt_link, link)
 static LIST(parameters, rt_parameter, parameter)
 
+/* Fields that have their defaults are left out at the end, and only there: `builtins_of`. */
+static bool motion(rt_cursor *cursor, rt_motion *into) {
+    uint32_t fields;
+    if (!rt_take_extended(cursor, 4, 6, &fields) || !INT(into->kind) || !INT(into->altitude) || !INT(into->speed) || !INT(into->time))
+        return false;
+    into->lowest = -1;
+    into->facing = RT_ALONG_LEGS;
+    if (fields > 4 && !INT(into->lowest)) return false;
+    if (fields > 5 && !INT(into->facing)) return false;
+    return fields == 4 || (fields == 5 ? into->lowest != -1 : into->facing != RT_ALONG_LEGS);
+}
+
+static bool plan(rt_cursor *cursor, rt_plan *into) {
+    uint32_t fields;
+    if (!rt_take_extended(cursor, 4, 6, &fields) || !INT(into->kind) || !rt_take_ints(cursor, &into->path) || !INT(into->altitude) ||
+        !INT(into->speed))
+        return false;
+    into->heights = into->headings = (rt_list){cursor->at, cursor->at, 0};
+    if (fields > 4 && !rt_take_ints(cursor, &into->heights)) return false;
+    if (fields > 5 && !rt_take_ints(cursor, &into->headings)) return false;
+    return fields == 4 || (fields == 5 ? into->heights.count : into->headings.count) > 0;
+}
+
 static bool contract(rt_cursor *cursor, rt_contract *into) {
-    return STRUCT(16) && TEXT(into->name) && parameters(cursor, &into->parameters) && STRUCT(4) && INT(into->motion.kind) &&
-           INT(into->motion.altitude) && INT(into->motion.speed) && INT(into->motion.time) && INT(into->timing_class) &&
-           INT(into->deadline_us) && INT(into->validity_us) && rt_take_texts(cursor, &into->phases) && INT(into->duration_us) &&
+    return STRUCT(16) && TEXT(into->name) && parameters(cursor, &into->parameters) && motion(cursor, &into->motion) &&
+           INT(into->timing_class) && INT(into->deadline_us) && INT(into->validity_us) && rt_take_texts(cursor, &into->phases) && INT(into->duration_us) &&
            INT(into->grace_us) && clauses(cursor, &into->require) && clauses(cursor, &into->assume) &&
            clauses(cursor, &into->maintain) && links(cursor, &into->fallback) && INT(into->energy) &&
            rt_take_texts(cursor, &into->record) && rt_take_ints(cursor, &into->reads);
@@ -190,13 +212,11 @@ rt_refusal rt_read_policy(rt_bytes payload, rt_policy *into) {
 
 static bool invocation(rt_cursor *cursor, rt_invocation *into) {
     const uint8_t *start = cursor->at;
-    rt_plan *plan = &into->plan;
     if (!STRUCT(17) || !OCTETS(into->invocation_id)) return false;
     const uint8_t *content = cursor->at;
     if (!INT(into->step) || !INT(into->phase) || !INT(into->skill) || !INT(into->source) || !INT(into->role) ||
         !rt_take_ints(cursor, &into->arguments) || !INT(into->issued_at_us) || !INT(into->phases) || !INT(into->on_inadmissible) ||
-        !contract(cursor, &into->contract) || !STRUCT(4) || !INT(plan->kind) || !rt_take_ints(cursor, &plan->path) || !INT(plan->altitude) ||
-        !INT(plan->speed) || !TEXT(into->text) || !INT(into->file) || !INT(into->start) || !INT(into->end))
+        !contract(cursor, &into->contract) || !plan(cursor, &into->plan) || !TEXT(into->text) || !INT(into->file) || !INT(into->start) || !INT(into->end))
         return false;
     into->content = (rt_bytes){content, (uint32_t)(cursor->at - content)};
     if (!OCTETS(into->binding)) return false;

@@ -44,6 +44,7 @@ static bool same_links(rt_list a, rt_list b) {
 static bool same_contract(const rt_contract *a, const rt_contract *b) {
     return rt_same(a->name, b->name) && rt_same_list(a->parameters, b->parameters) && a->motion.kind == b->motion.kind &&
            a->motion.altitude == b->motion.altitude && a->motion.speed == b->motion.speed && a->motion.time == b->motion.time &&
+           a->motion.lowest == b->motion.lowest && a->motion.facing == b->motion.facing &&
            a->timing_class == b->timing_class && a->deadline_us == b->deadline_us && a->validity_us == b->validity_us &&
            rt_same_list(a->phases, b->phases) && a->duration_us == b->duration_us && a->grace_us == b->grace_us &&
            same_clauses(a->require, b->require) && same_clauses(a->assume, b->assume) && same_clauses(a->maintain, b->maintain) &&
@@ -57,6 +58,7 @@ static bool same_step(const rt_invocation *a, const rt_invocation *b, uint64_t p
            rt_same_list(a->arguments, b->arguments) && ((uint64_t)a->phases & phases) == ((uint64_t)b->phases & phases) &&
            a->on_inadmissible == b->on_inadmissible && same_contract(&a->contract, &b->contract) && a->plan.kind == b->plan.kind &&
            rt_same_list(a->plan.path, b->plan.path) && a->plan.altitude == b->plan.altitude && a->plan.speed == b->plan.speed &&
+           rt_same_list(a->plan.heights, b->plan.heights) && rt_same_list(a->plan.headings, b->plan.headings) &&
            rt_same(a->text, b->text);
 }
 

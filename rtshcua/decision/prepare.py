@@ -408,6 +408,7 @@ def prepare_invocation(
             flown_at(contract.motion, plan.altitude, policy.policy.vehicle),
             policy.policy.vehicle.position_error,
             near_home(policy.policy.vehicle),
+            plan.heights,
         ),
         energy=Energy(contract, policy.policy.vehicle, plan.speed),
         reads=tuple((slot, policy.limits[slot].stale_us) for slot in _reads(clauses, policy.policy)),

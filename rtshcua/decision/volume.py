@@ -1,16 +1,19 @@
 """The planned volume: every place where a skill may take the vehicle from where it is now.
 
 It is the leg from the present position to the first point of the plan's path, and the path, at all heights between
-the present one and the plan's altitude. LAND is the descent at the present position. HOME climbs to the vehicle's
-return altitude if it is lower, flies home at that height or its own, and descends there (`across`). The volume is
-widened by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no
-floor (`LOWEST`): a height of 0 lies *on* a floor of 0, hence outside.
+the present one and the plan's altitude. Where the points have heights of their own, each leg is at the heights
+between those of its ends, the first one from the present height, whichever way the vehicle flies there. LAND is the
+descent at the present position. HOME climbs to the vehicle's return altitude if it is lower, flies home at that
+height or its own, and descends there (`across`). The volume is widened by the vehicle's position error. Zones that a
+vehicle takes off from or lands in must therefore have no floor (`LOWEST`): a height of 0 lies *on* a floor of 0, hence
+outside.
 
 PX4 1.16 (rtl.cpp, rtl_direct.cpp) and ArduCopter 4.7 (mode_rtl.cpp) fly this way. Both start the way across
 shortly before they reach the height, and climb less near home: docs/flying/returns.md.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import isqrt
 from typing import NamedTuple
 
@@ -49,18 +52,25 @@ UNKNOWN_VOLUME = Volume(NOWHERE, MISSING, (0, 0))
 class Planner:
     """The planned volumes of one plan. It caches the last start, because the result depends on nothing else."""
 
-    __slots__ = ("_altitude", "_distance", "_error", "_kind", "_last", "_leg", "_near", "_path", "_sweep")
+    __slots__ = (
+        "_altitude", "_distance", "_error", "_heights", "_kind", "_last", "_leg", "_levelled", "_levels", "_near",
+        "_path", "_sweep",
+    )  # fmt: skip
 
     def __init__(
-        self, kind: int, path: tuple[int, ...], altitude: int | None, position_error: int, near: int = 0
-    ) -> None:
+        self, kind: int, path: tuple[int, ...], altitude: int | None, position_error: int, near: int = 0,
+        heights: tuple[int, ...] = (),
+    ) -> None:  # fmt: skip
         """`altitude` is None where the start height counts. For HOME it is the height to which the return climbs,
-        unless it begins within `near` mm.
+        unless it begins within `near` mm. `heights` are those of the points of the path, if they have their own.
         """
         self._kind, self._altitude, self._near = kind, altitude, near
+        self._heights = heights
         self._path = HOME if kind == MotionKind.HOME else path
         self._error: Box = (-position_error, -position_error, position_error, position_error)
-        self._sweep = Sweep(self._path, self._error) if self._path else None
+        self._sweep = Sweep(self._path, self._error) if self._path and not heights else None
+        self._levels = levels(self._path, heights, self._error)
+        self._levelled: dict[tuple[int, int], PlaceSet] = {}
         self._distance = max((distance(*self._path[at : at + 2]) for at in range(0, len(self._path), 2)), default=0)
         self._leg: tuple[tuple[int, int, int, int], Sweep, Sweep, Span] | None = None
         self._last: tuple[tuple[Value, Value, Value], Volume] | None = None
@@ -90,11 +100,22 @@ class Planner:
             if self._kind == MotionKind.LAND:
                 low = min(low, 0)
             elif self._altitude is not None:
-                low, high = min(low, self._altitude), max(high, self._altitude)
+                first = self._heights[0] if self._heights else self._altitude
+                low, high = min(low, first), max(high, first)
             parts = [(leg, low, high)]
+            if self._heights:
+                low, high = min(low, *self._heights), max(high, *self._heights)
         if self._sweep is not None:
             parts.append((self._sweep, low, high))
-        return Volume(PlaceSet(tuple(parts), located, gap), (low, high, gap, None), farthest)
+        place = PlaceSet(tuple(parts), located, gap, self._fixed(located, gap) if self._heights else None)
+        return Volume(place, (low, high, gap, None), farthest)
+
+    def _fixed(self, located: int, gap: int) -> PlaceSet:
+        """The path at the heights of its points, which keeps its answers."""
+        fixed = self._levelled.get((located, gap))
+        if fixed is None:
+            fixed = self._levelled[located, gap] = PlaceSet(self._levels, located, gap)
+        return fixed
 
     def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Sweep, Span]:
         """The start, anywhere in a box; the leg from there to the path; and the distance from home of the farthest
@@ -113,6 +134,22 @@ class Planner:
         span = (nearest, farthest)
         self._leg = (key, start, leg, span)
         return start, leg, span
+
+
+def levels(path: tuple[int, ...], heights: tuple[int, ...], box: Box) -> tuple[Part, ...]:
+    """The legs of a path whose points have heights of their own: those one after the other that are between the same
+    two heights are one part.
+    """
+    if len(heights) == 1:
+        return ((Sweep(path, box), heights[0], heights[0]),)
+    legs = [(min(pair), max(pair)) for pair in pairwise(heights)]
+    found: list[Part] = []
+    begins = 0
+    for number, span in enumerate(legs):
+        if number + 1 == len(legs) or legs[number + 1] != span:
+            found.append((Sweep(path[2 * begins : 2 * number + 4], box), *span))
+            begins = number + 1
+    return tuple(found)
 
 
 def across(low: int, returns: int, *, near: bool) -> int:

@@ -207,17 +207,22 @@ Part: TypeAlias = tuple[Sweep, int, int]
 
 class PlaceSet:
     """A set of places: the union of its parts, of which there is at least one. `located` and `high` say whether
-    position and height may be missing; either may suffice to show that the places are outside a zone.
+    position and height may be missing; either may suffice to show that the places are outside a zone. `fixed` is
+    another set that belongs to it, with the same gaps: its answers stay the same for many sets.
 
     It also caches each zone's answer, so that an unchanged planned volume is not compared again.
     """
 
-    __slots__ = ("_answers", "_bounds", "high", "located", "parts")
+    __slots__ = ("_answers", "_bounds", "_fixed", "_own", "high", "located", "parts")
 
-    def __init__(self, parts: tuple[Part, ...], located: int = PRESENT, high: int = PRESENT) -> None:
-        self.parts, self.located, self.high = parts, located, high
+    def __init__(
+        self, parts: tuple[Part, ...], located: int = PRESENT, high: int = PRESENT, fixed: "PlaceSet | None" = None
+    ) -> None:
+        self._own, self._fixed = parts, fixed
+        self.parts: tuple[Part, ...] = parts if fixed is None else parts + fixed.parts
+        self.located, self.high = located, high
         self._answers: dict[int, Truth] = {}
-        self._bounds = None if located or high or len(parts) > 1 else _bounds(*parts[0])
+        self._bounds = None if located or high or len(self.parts) > 1 else _bounds(*parts[0])
 
     def inside(self, zone: PreparedZone) -> Truth:
         """Whether the places are inside a zone, at a time when it exists."""
@@ -231,8 +236,8 @@ class PlaceSet:
         return answer
 
     def _inside(self, zone: PreparedZone) -> Truth:
-        truth, located = 0, self.located
-        for sweep, low, high in self.parts:
+        truth, located = 0 if self._fixed is None else self._fixed.inside(zone), self.located
+        for sweep, low, high in self._own:
             vertical = zone.between(low, high, self.high)
             if vertical == FALSE:
                 truth |= FALSE

@@ -134,6 +134,7 @@ LOITER_OUTSIDE = _code("E0515", "loiter-outside", "a fallback of a step flies or
 BAD_CORRIDOR = _code("E0516", "bad-corridor", "invalid corridor")
 NO_CLOCK = _code("E0517", "no-clock", "a local time needs the vehicle's time zone")
 UNKNOWN_TIME_ZONE = _code("E0518", "unknown-time-zone", "unknown time zone")
+BAD_LEVELS = _code("E0519", "bad-levels", "the heights of a survey path are in the wrong order or too close")
 
 # E06: skills, arguments, fallback chains
 UNKNOWN_ARGUMENT = _code("E0601", "unknown-argument", "unknown argument")

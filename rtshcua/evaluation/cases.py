@@ -135,7 +135,7 @@ def _value(signal: Signal, before: Sequence[Invocation], chance: Random) -> tupl
             if not before:
                 return (chance.randint(-_OFF, _OFF),)
             rises = (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)
-            return (next(each.plan.altitude for each in reversed(before) if each.plan.kind in rises),)
+            return (next(each.plan.last_height for each in reversed(before) if each.plan.kind in rises),)
         case "landed":
             return (_IN_AIR if before else _ON_GROUND,)
     return (chance.randint(*_USUAL[signal.name]),)

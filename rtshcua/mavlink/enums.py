@@ -71,5 +71,7 @@ MAV_MISSION_TYPE_RALLY: Final = 2
 
 #: POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored
 POSITION_ONLY: Final = 0x0DF8
+#: the same, but for the yaw
+POSITION_AND_YAW: Final = 0x09F8
 #: INT32_MAX: in x and y of COMMAND_INT the equivalent of NaN in a float
 NO_PLACE: Final = (1 << 31) - 1

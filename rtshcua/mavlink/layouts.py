@@ -127,5 +127,5 @@ LAYOUTS: Final = {
 of_command_long: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7 command")
 of_command_int: Final = LAYOUTS[COMMAND_INT].getter("param1 param2 param3 param4 x y z command frame")
 of_position_target: Final = LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter(
-    "lat_int lon_int alt type_mask coordinate_frame"
+    "lat_int lon_int alt yaw type_mask coordinate_frame"
 )

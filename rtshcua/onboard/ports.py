@@ -11,7 +11,7 @@ from typing import Final, NamedTuple, Protocol, dataclass_transform
 
 import msgspec
 
-from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.mission import ALONG, Invocation
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import SigningKey
 
@@ -226,7 +226,8 @@ class Command(Frozen, frozen=True):
 
     `kind` is a `MotionKind`. `path` is x0, y0, ... in local mm (east, north of declared home) with `geo` the same
     points as latitude, longitude in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s (0: the vehicle's
-    own default). A HOLD succeeds after `hold_us` of observed holding; with 0 it continues until another command
+    own default). `heights` (mm above home) and `headings` (1/100 degree, or `ALONG`) are those of the points of the
+    path, as in a `Plan`. A HOLD succeeds after `hold_us` of observed holding; with 0 it continues until another command
     replaces it.
 
     `needs_record`: it is held until every earlier `Append` is stored, and not sent if one cannot be stored
@@ -243,7 +244,17 @@ class Command(Frozen, frozen=True):
     speed: int
     hold_us: int = 0
     needs_record: bool = False
+    heights: tuple[int, ...] = ()
+    headings: tuple[int, ...] = ()
     not_after_us: int = ALWAYS
+
+    def height_at(self, number: int) -> int:
+        """The height of a point of the path, mm above home."""
+        return self.heights[number] if self.heights else self.altitude
+
+    def heading_at(self, number: int) -> int:
+        """The heading of the nose at a point of the path, 1/100 degree, or `ALONG`."""
+        return self.headings[number] if self.headings else ALONG
 
 
 class Ending(StrEnum):

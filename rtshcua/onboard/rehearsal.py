@@ -94,7 +94,7 @@ def flown(state: State, plan: Plan, vehicle: VehicleLimits) -> State:
         case MotionKind.CLIMB:
             there[vehicle.height] = plan.altitude
         case MotionKind.FLY | MotionKind.COVER:
-            there |= _at(vehicle, plan.path[-2], plan.path[-1], plan.altitude)
+            there |= _at(vehicle, plan.path[-2], plan.path[-1], plan.last_height)
         case MotionKind.HOME:
             there |= _at(vehicle, 0, 0, 0)
         case MotionKind.LAND:

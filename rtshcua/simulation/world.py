@@ -7,7 +7,7 @@ the same bytes.
 from collections.abc import Callable, Mapping
 from heapq import heappop, heappush
 from itertools import count
-from math import hypot
+from math import degrees, hypot
 from random import Random
 from typing import NamedTuple
 
@@ -49,6 +49,8 @@ class Truth(NamedTuple):
     taken_over_us: int | None
     """When a pilot or a failsafe first took over the armed vehicle with effect; None before."""
     taken_over_by: Taker | None
+    heading: int
+    """Of the nose, 1/100 degree from north."""
 
 
 class Simulation:
@@ -140,6 +142,7 @@ class Simulation:
             round(self._autopilot.air.east * 1000),
             self._taken_over_us,
             self._autopilot.taker,
+            round(degrees(body.yaw) * 100) % 36_000,
         )
 
     def _tick(self, at_us: int) -> None:

@@ -190,7 +190,8 @@ class RuntimeChecks:
         if flight.motion is MotionKind.CLIMB:
             return sample.up_mm >= plan.altitude - REACHED_MM // 2
         x, y = self._place(sample)
-        return hypot(x - plan.path[-2], y - plan.path[-1]) <= REACHED_MM
+        level = not plan.heights or abs(sample.up_mm - plan.last_height) <= REACHED_MM
+        return level and hypot(x - plan.path[-2], y - plan.path[-1]) <= REACHED_MM
 
     def _place(self, sample: TruthSample) -> tuple[float, float]:
         return local_mm(self._flown.policy, sample.latitude, sample.longitude)

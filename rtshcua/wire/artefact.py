@@ -8,6 +8,7 @@ from typing import Final, TypeVar, cast
 import msgspec
 
 from rtshcua.wire import cbor, names
+from rtshcua.wire.builtins import builtins_of
 from rtshcua.wire.cbor import CborError, Value
 from rtshcua.wire.names import Artefact
 from rtshcua.wire.untrusted import Untrusted
@@ -70,7 +71,7 @@ def _claimed(data: bytes) -> tuple[bytes, int] | None:
 
 def pack(artefact: Artefact, body: msgspec.Struct) -> bytes:
     """The canonical bytes of an artefact whose body is a struct."""
-    return wrap(artefact, msgspec.to_builtins(body, builtin_types=(bytes,)))
+    return wrap(artefact, builtins_of(body))
 
 
 def unpack(

@@ -12,6 +12,7 @@ import msgspec
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.struct import Flat
 from rtshcua.wire import cbor
+from rtshcua.wire.builtins import builtins_of
 from rtshcua.wire.digest import BINDING, Domain, digest
 
 #: length of an invocation's id in bytes
@@ -47,7 +48,7 @@ def binding_of(mission: Mission, invocation: Invocation) -> bytes:
         mission.issued_at_us,
         list(mission.phases),
     ]
-    own = msgspec.to_builtins(msgspec.structs.replace(invocation, binding=b""), builtin_types=(bytes,))
+    own = builtins_of(msgspec.structs.replace(invocation, binding=b""))
     return digest(BINDING, cbor.encode([around, own]))
 
 
@@ -78,4 +79,4 @@ def _ids(mission: Mission, after: bytes) -> list[bytes]:
 
 
 def _encoded(part: Flat) -> bytes:
-    return cbor.encode(msgspec.to_builtins(part, builtin_types=(bytes,)))
+    return cbor.encode(builtins_of(part))

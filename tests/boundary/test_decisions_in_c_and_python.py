@@ -35,6 +35,7 @@ from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zon
 from rtshcua.wire import bundle, names
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.untrusted import Untrusted
+from unit.decision.test_levels import LEVELS, levelled
 from unit.decision.test_malformed_areas import REFUSED
 from unit.decision.test_prepare import INVOCATIONS, POLICIES
 from unit.decision.test_reference_cases import CASES
@@ -148,6 +149,37 @@ def test_a_malformed_mission_is_refused(native: Native) -> None:
     for invocation, what in INVOCATIONS:
         with suppress(CborError):  # it cannot be written
             assert fly(native, policy, rich_worlds.mission(invocation)) is None, what
+
+
+@pytest.mark.parametrize(("heights", "lowest", "headings", "what"), LEVELS)
+def test_heights_and_headings_are_checked_alike(
+    native: Native, heights: tuple[int, ...], lowest: int, headings: tuple[int, ...], what: str | None
+) -> None:
+    step, policy = levelled(*heights, headings=headings, lowest=lowest)
+    assert native.policy(policy.policy) is None
+    assert (fly(native, policy, rich_worlds.mission(replace(step, step=0))) is None) is (what is not None)
+
+
+@pytest.mark.slow
+def test_paths_with_heights_are_decided_alike(native: Native) -> None:
+    """In policies whose survey has several heights."""
+    of, decided = Random(11), 0
+    while decided < 400:
+        policy = prepare(worlds.policy(of))
+        assert isinstance(policy, PreparedPolicy)
+        if policy.policy.contracts[flat.INSPECT].motion.lowest == -1:
+            continue
+        assert native.policy(policy.policy) is None
+        for _ in range(4):
+            step = worlds.invocation(of, policy.policy)
+            found = fly(native, policy, rich_worlds.mission(replace(step, step=0)))
+            if found is None or not step.plan.heights:
+                continue
+            native.step(0)
+            states = [worlds.state(of, len(policy.monitors)) for _ in range(8)]
+            questions = [Question(each, worlds.context(of, found[0].invocation), worlds.now(of)) for each in states]
+            agree(native, found[0], questions)
+            decided += len(questions)
 
 
 def mutated(native: Native, plain: PreparedPolicy, of: Random) -> tuple[bool, bool]:

@@ -197,6 +197,10 @@ def some_mission(of: Loaded, random: Random) -> Mission:
             },
             {"contract": replace(contract, energy=contract.energy + 1)},
             {"plan": replace(step.plan, altitude=step.plan.altitude + 1)},
+            {"plan": replace(step.plan, heights=(7,))},
+            {"plan": replace(step.plan, headings=(7,))},
+            {"contract": replace(contract, motion=replace(contract.motion, lowest=0))},
+            {"contract": replace(contract, motion=replace(contract.motion, facing=1))},
         ]
         steps = (*steps[:at], replace(step, **random.choice(changes)), *steps[at + 1 :])
     if random.random() < 0.1:

@@ -6,6 +6,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from msgspec.structs import replace
 
 from boundary.layout import differences, structs
 from boundary.mutants import altered, damaged
@@ -15,6 +16,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.wire import artefact, bundle, cbor, cose, names
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.untrusted import Untrusted
+from unit.decision.test_levels import levelled
 from unit.wire.test_cbor import EXAMPLES, REFUSED
 
 STRUCTS = structs()
@@ -40,7 +42,15 @@ def payloads() -> list[bytes]:
         *written,
         bundle.policy_payload(bundle_case.THE_POLICY),
         bundle.mission_payload(bundle_case.THE_MISSION),
+        *levels(),
     ]
+
+
+def levels() -> list[bytes]:
+    """A policy and a mission with heights and headings."""
+    step, policy = levelled(*(9, 20) * (len(flat_case.PATH) // 4), headings=(0, -1) * (len(flat_case.PATH) // 4))
+    mission = replace(flat_case.MISSION, invocations=(replace(step, step=0),))
+    return [bundle.policy_payload(policy.policy), bundle.mission_payload(mission)]
 
 
 @pytest.fixture(scope="module")

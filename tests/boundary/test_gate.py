@@ -3,7 +3,7 @@ same reason, with the same octets, and the same incoming frames are accepted.
 """
 
 import ctypes
-from math import inf, nan
+from math import inf, nan, radians
 from random import Random
 from typing import Any
 
@@ -16,6 +16,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import unsigned
 from rtshcua.mavlink.signing import EPOCH_US, MINUTE, MOST_AHEAD, SignedLink, SigningState
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import ALONG, TURN
 from rtshcua.model.flat.zone import SHIFT, Projection, unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.ports import Command
@@ -28,6 +29,7 @@ HOMES = (  # Zurich; across longitude 180, in the south; near the pole
     Projection(-171_000_000, 1_799_999_900, int(10.6 * (1 << SHIFT)), int(11.06 * (1 << SHIFT))),
     Projection(890_000_000, -1_000_000, int(0.19 * (1 << SHIFT)), int(11.17 * (1 << SHIFT))),
 )
+HEADINGS = (0, 1, 4_500, 17_999, 18_000, 18_001, 35_999)
 SAMPLE, SOAK = 40, 40_000
 
 
@@ -40,8 +42,13 @@ class InC:
         boundary.rt_test_gate_begin()
 
     def open(self, command: Command, projection: Projection, not_after_us: int) -> None:
-        octets = b"".join(map(cbor.encode, command.path))
-        self.kept = octets
+        octets, *levels = (
+            b"".join(map(cbor.encode, each)) for each in (command.path, command.heights, command.headings)
+        )
+        self.kept = octets, levels
+        self._lib.rt_test_gate_levels(
+            levels[0], len(levels[0]), len(command.heights), levels[1], len(levels[1]), len(command.headings)
+        )
         self._lib.rt_test_gate_open(
             ctypes.c_int64(command.kind), ctypes.c_int64(command.altitude), ctypes.c_int64(command.speed), octets,
             len(octets), len(command.path),
@@ -79,16 +86,25 @@ def drawn_command(random: Random, home: Projection) -> Command:
     kind = random.choice(list(MotionKind))
     path = tuple(near) if kind in (MotionKind.FLY, MotionKind.COVER) else ()
     geo = tuple(part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(home, x, y))
-    return Command(7, "skill", kind, path, geo, random.choice((20_000, 35_250)), random.choice((0, 4_000, 3_333)))
+    altitude, speed = random.choice((20_000, 35_250)), random.choice((0, 4_000, 3_333))
+    heights = tuple(random.choice((altitude, 5_000, 12_340)) for _ in path[::2]) if random.random() < 0.5 else ()
+    headings = tuple(random.choice((ALONG, *HEADINGS)) for _ in path[::2]) if random.random() < 0.5 else ()
+    return Command(7, "skill", kind, path, geo, altitude, speed, heights=heights, headings=headings)
 
 
 def drawn_frame(random: Random, of: Command) -> bytes:
     """A frame for the command, a similar one, housekeeping, or any other, sometimes damaged."""
-    x, y = random.choice([*zip(of.geo[::2], of.geo[1::2], strict=True), (2**31 - 1, 2**31 - 1), (1, 2)])
-    height = of.altitude / 1000 + random.choice((0, 0, 0.001, 0.003, 1.999, 2.002, -5.0))
+    at = random.randrange(len(of.geo) // 2 + 2)
+    x, y = [*zip(of.geo[::2], of.geo[1::2], strict=True), (2**31 - 1, 2**31 - 1), (1, 2)][at]
+    of_point = at if at < len(of.geo) // 2 and random.random() < 0.8 else random.randrange(len(of.geo) // 2 or 1)
+    height = (of.heights[of_point] if of.heights else of.altitude) / 1000
+    height += random.choice((0, 0, 0.001, 0.003, 1.999, 2.002, -5.0))
     speed = of.speed / 1000 + random.choice((0, 0, 0.0015, 0.0025))
     odd = random.choice((0.0, -0.0, nan, inf, 1.0, -1.0, 1e-45, 3.4e38))
     sea = HOME_AMSL / 1000 + height
+    heading = of.headings[of_point] if of.headings else ALONG
+    turned = (heading + random.choice((0, 0, 0, 1, 9_000)) + 18_000) % TURN - 18_000
+    yaw = nan if heading == ALONG else radians(turned / 100)
     message = random.choice(
         (
             long(176, 1, random.randrange(12), random.randrange(8)),
@@ -101,10 +117,11 @@ def drawn_frame(random: Random, of: Command) -> bytes:
             long(random.choice((401, 511, 512, 246, 185)), random.choice((0, odd))),
             m.MAVLink_command_int_message(
                 SYSTEM, 1, random.choice((0, 0, 0, 3)), 192, 0, 0, random.choice((speed, -1.0)), 1,
-                random.choice((0, odd)), random.choice((nan, nan, 0)), x, y, random.choice((sea, sea, nan)),
+                random.choice((0, odd)), random.choice((yaw, yaw, yaw, nan, 0)), x, y, random.choice((sea, sea, nan)),
             ),
             m.MAVLink_set_position_target_global_int_message(
-                0, SYSTEM, 1, 6, random.choice((0x0DF8, 0x0DF8, 0x0DF0)), x, y, height, 1, 0, 0, 0, 0, 0, 0, 0
+                0, SYSTEM, 1, 6, random.choice((0x0DF8, 0x0DF8, 0x09F8, 0x09F8, 0x0DF0)), x, y, height, 1, 0, 0, 0, 0,
+                0, random.choice((0, yaw, yaw)), 0,
             ),
             m.MAVLink_heartbeat_message(random.choice((18, 6)), 8, random.choice((0, 128)), 0, 4, 3),
             m.MAVLink_param_set_message(
@@ -135,7 +152,8 @@ def drawn_report(random: Random, of: Command, autopilot: int) -> bytes:
     """A random report of the vehicle about itself."""
     x, y = random.choice([*zip(of.geo[::2], of.geo[1::2], strict=True), (0, 0)])
     off = random.choice((0, 200, 440, 460, 700))
-    above = random.randrange(50_000)
+    near = [height + random.choice((0, 3_000, 3_001)) for height in of.heights]
+    above = random.choice((random.randrange(50_000), *near))
     home = HOME_AMSL + random.choice((0, 500, 9_999, 10_001))
     message = random.choice(
         (
@@ -195,6 +213,57 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
             ahead = here.sign_ahead(frame, opened, now_us)
             assert there.sign_ahead(frame, now_us) == (ahead.slug if isinstance(ahead, Refusal) else None), frame.hex()
     return left
+
+
+def target_frame(autopilot: int, place: tuple[int, int], height: float, heading: float | None) -> bytes:
+    """A target at a place, mm above home, with a heading in 1/100 degree or along the leg."""
+    yaw = nan if heading is None else radians((heading + 18_000) % TURN / 100 - 180)
+    if autopilot == AUTOPILOTS[1]:
+        sea = (HOME_AMSL + height) / 1_000
+        return pack(m.MAVLink_command_int_message(SYSTEM, 1, 0, 192, 0, 0, -1.0, 1, 0, yaw, *place, sea))
+    mask, yaw = (0x0DF8, 0.0) if heading is None else (0x09F8, yaw)
+    return pack(
+        m.MAVLink_set_position_target_global_int_message(
+            0, SYSTEM, 1, 6, mask, *place, height / 1_000, 0, 0, 0, 0, 0, 0, yaw, 0
+        )
+    )
+
+
+def compare_levels(boundary: ctypes.CDLL, seed: int) -> int:
+    """Walk along a path with heights and headings, with many wrong frames; returns how many frames both passed."""
+    random = Random(seed)
+    here, there, home = FrameSession(), InC(boundary), random.choice(HOMES)
+    autopilot, now_us, left = random.choice(AUTOPILOTS), 1_000_000, 0
+    count = random.randrange(1, 6)
+    path = tuple(random.choice((0, 4_000, 60_000)) for _ in range(2 * count))
+    geo = tuple(part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(home, x, y))
+    heights = tuple(random.choice((5_000, 7_500, 8_000, 20_000)) for _ in range(count))
+    headings = tuple(random.choice((ALONG, *HEADINGS)) for _ in range(count)) if random.random() < 0.7 else ()
+    command = Command(7, "skill", MotionKind.COVER, path, geo, 20_000, 0, heights=heights, headings=headings)
+    here.open(replace(command, not_after_us=now_us))
+    there.open(command, home, now_us)
+    reports = [m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3)]
+    for number in range(count):
+        x, y = geo[2 * number : 2 * number + 2]
+        for height in (heights[number] + random.choice((0, 2_999, 3_001, -9_000)), heights[number]):
+            reports.append(m.MAVLink_global_position_int_message(0, x, y, HOME_AMSL + height, height, 0, 0, 0, 0))
+            for report in reports:
+                here.observe(pack(report, 1), now_us)
+                there.observe(pack(report, 1), now_us)
+            for _ in range(8):
+                of = min(max(number + random.choice((-1, 0, 0, 1, 1)), 0), count - 1)
+                wanted = None if command.heading_at(of) == ALONG else command.heading_at(of) + random.choice((0, 0, 1))
+                level = heights[random.choice((of, of, of, number))] + random.choice((0, 0, 2, 3))
+                frame = target_frame(autopilot, geo[2 * of : 2 * of + 2], level, wanted)
+                one, other = here.seal(frame, now_us), there.seal(frame, now_us)
+                assert other == (one.slug if isinstance(one, Refusal) else one), (seed, frame.hex())
+                left += not isinstance(one, Refusal)
+            reports.clear()
+    return left
+
+
+def test_paths_with_heights_and_headings_pass_alike(boundary: ctypes.CDLL) -> None:
+    assert sum(compare_levels(boundary, seed) for seed in range(SAMPLE)) > 2 * SAMPLE
 
 
 def compare_links(boundary: ctypes.CDLL, seed: int) -> int:

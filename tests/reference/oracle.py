@@ -63,7 +63,9 @@ class Oracle:
 
     # ------------------------------------------------------------------------------------------ planned volume
 
-    def volume(self, kind: int, path: tuple[int, ...], altitude: int | None) -> list[Leg]:
+    def volume(
+        self, kind: int, path: tuple[int, ...], altitude: int | None, heights: tuple[int, ...] = ()
+    ) -> list[Leg]:
         """The planned legs; unknown if the place is unknown, with unknown heights if the height is unknown."""
         place, z = self.place(), self.slot(self.policy.vehicle.height)
         error = self.policy.vehicle.position_error
@@ -77,6 +79,11 @@ class Oracle:
         if kind == MotionKind.HOME:
             down = None if low is None else min(low, 0)
             return [(place, (0, 0), box, low, high), (place and (0, 0), (0, 0), box, down, high)]
+        if heights:
+            ends = [*zip([z, *heights], heights, strict=False)]
+            spans = [(None, None) if z is None else (min(a, b), max(a, b)) for a, b in ends]
+            legs = [(a, b, box, *span) for (a, b), span in zip(pairwise(points), spans, strict=True)]
+            return [(place and a, b, box, *span) for a, b, box, *span in legs]
         if len(points) == 1:
             return [(place, place, box, low, high)]
         return [(place and a, b, box, low, high) for a, b in pairwise(points)]
@@ -246,7 +253,8 @@ class Oracle:
 
     def seven_letters(self, invocation: Invocation) -> list[tuple[str, Reason]]:
         contract, plan, vehicle = invocation.contract, invocation.plan, self.policy.vehicle
-        legs = self.volume(plan.kind, plan.path, None if contract.motion.altitude == -1 else plan.altitude)
+        altitude = None if contract.motion.altitude == -1 else plan.altitude
+        legs = self.volume(plan.kind, plan.path, altitude, plan.heights)
         longest = contract.duration_us or vehicle.endurance_us
         letters = [
             ("T" if plan.speed <= vehicle.speed else "F", Reason.ENVELOPE),

@@ -15,9 +15,9 @@ from reference.flat_case import M, S
 from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import MISSING, Sets, Value, interval, maybe, members, point
 from rtshcua.model.flat.code import Clause, Op
-from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract, SourceKind
+from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract, Facing, Parameter, SourceKind
 from rtshcua.model.flat.limits import DAY
-from rtshcua.model.flat.mission import Invocation, Plan
+from rtshcua.model.flat.mission import ALONG, TURN, Invocation, Plan
 from rtshcua.model.flat.policy import Airspace, Monitor, MonitorKind, Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, POLYGON, Zone
@@ -137,6 +137,28 @@ def contract(of: Random, plain: Contract, monitors: tuple[Monitor, ...]) -> Cont
     )
 
 
+LOWEST_HEIGHT = Parameter("lowest", QUANTITY, "altitude", 4, 0, 60 * M, ())
+
+
+def levelled(of: Random, plain: Contract) -> Contract:
+    """A survey at several heights, perhaps facing inward."""
+    facing = of.choice([Facing.ALONG, Facing.INWARD])
+    motion = replace(plain.motion, lowest=LOWEST_HEIGHT.cell, facing=facing)
+    return replace(plain, parameters=(*plain.parameters, LOWEST_HEIGHT), motion=motion)
+
+
+def levels(of: Random, contract: Contract, plan: Plan, lowest: int) -> Plan:
+    """The plan with heights and headings as its contract has them."""
+    points, motion = len(plan.path) // 2, contract.motion
+    heights = tuple(of.randint(min(lowest, plan.altitude), plan.altitude) for _ in range(points * of.randrange(2)))
+    headings = tuple(of.choice((ALONG, of.randrange(TURN))) for _ in range(points))
+    return replace(
+        plan,
+        heights=heights if motion.lowest != -1 else (),
+        headings=headings if motion.facing != Facing.ALONG else (),
+    )
+
+
 def rule(of: Random, contracts: tuple[Contract, ...], reach: Reach) -> Rule:
     kind = of.choice([RuleKind.PERMIT] * 6 + [*RuleKind])
     skills = of.choice([(), (flat.INSPECT,), (flat.INSPECT,), (flat.GOTO,), (flat.TAKEOFF,), (flat.HOVER, flat.HOME)])
@@ -186,6 +208,8 @@ def policy(of: Random) -> Policy:
     asked = tuple(sorted(of.sample(range(len(phases)), of.randint(0, len(phases)))))
     reach = Reach(len(observed), phased=True)
     contracts = tuple(contract(of, plain, observed) for plain in flat.CONTRACTS)
+    if of.random() < 0.3:
+        contracts = tuple(levelled(of, each) if n == flat.INSPECT else each for n, each in enumerate(contracts))
     zones = tuple(zone(of) if of.random() < 0.2 else plain for plain in flat.ZONES)
     zones = tuple(timed(of, one) if of.random() < 0.1 else one for one in zones)
     some = Airspace(*(tuple(of.sample(range(6), of.randrange(2))) for _ in range(2)), "airspace", 0, 0, 1)
@@ -250,11 +274,15 @@ def invocation(of: Random, policy: Policy) -> Invocation:
         path = survey(of, policy.zones[values[0]]) if values[0] < policy.declared else flat.PATH
     altitude = 0 if motion.altitude == -1 else values[motion.altitude]
     speed = 0 if motion.speed == -1 else values[motion.speed]
+    plan = Plan(motion.kind, path, altitude, speed)
+    if motion.lowest != -1:
+        values = (*values, min(altitude, of.choice([0, 5, 10, 19, 20]) * M))
+        plan = levels(of, contract, plan, values[-1])
     return flat.invocation(
         of.randrange(4),
         0,
         skill,
-        Plan(motion.kind, path, altitude, speed),
+        plan,
         *values,
         contract=contract,
         source=of.choice([SourceKind.AGENT] * 20 + [*SourceKind]),

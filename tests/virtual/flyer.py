@@ -51,16 +51,20 @@ class Flyer:
         )
 
     def begin(
-        self, kind: MotionKind, *points: tuple[int, int], altitude: int = 0, speed: int = 0, hold_us: int = 0
-    ) -> int:
+        self, kind: MotionKind, *points: tuple[int, int], altitude: int = 0, speed: int = 0, hold_us: int = 0,
+        heights: tuple[int, ...] = (), headings: tuple[int, ...] = (),
+    ) -> int:  # fmt: skip
         """Start a command and return its token."""
         self.token += 1
         path = tuple(part for point in points for part in point)
-        command = Command(self.token, kind.name.lower(), kind, path, geo(*points), altitude, speed, hold_us)
+        command = Command(
+            self.token, kind.name.lower(), kind, path, geo(*points), altitude, speed, hold_us,
+            heights=heights, headings=headings,
+        )  # fmt: skip
         self.vehicle.begin(command, self.now_us)
         return self.token
 
-    def fly(self, kind: MotionKind, *points: tuple[int, int], seconds: float = 300, **more: int) -> Any:
+    def fly(self, kind: MotionKind, *points: tuple[int, int], seconds: float = 300, **more: Any) -> Any:
         """Start a command and wait for its end."""
         token = self.begin(kind, *points, **more)
         end = self.until((Succeeded, CommandFailed, TakenOver), seconds)

@@ -25,11 +25,13 @@ static bool check_parameters(const rt_contract *contract, const rt_policy *polic
 }
 
 static bool check_motion(const rt_motion *motion, const uint8_t cells[RT_MAX_CELLS]) {
-    const int64_t named[3] = {motion->altitude, motion->speed, motion->time};
+    const int64_t named[4] = {motion->altitude, motion->speed, motion->time, motion->lowest};
     int places = 0, zones = 0;
     if (!rt_within(motion->kind, RT_HOLD, RT_LAND)) return false;
-    for (int at = 0; at < 3; at++)
+    for (int at = 0; at < 4; at++)
         if (named[at] != -1 && (!rt_within(named[at], 0, RT_MAX_CELLS - 1) || cells[named[at]] != RT_QUANTITY)) return false;
+    if (!rt_within(motion->facing, RT_ALONG_LEGS, RT_INWARD)) return false;
+    if (motion->kind != RT_COVER && (motion->lowest != -1 || motion->facing != RT_ALONG_LEGS)) return false;
     for (int at = 0; at < RT_MAX_CELLS; at++) {
         places += cells[at] == RT_PLACE;
         zones += cells[at] == RT_ZONE;
@@ -249,7 +251,7 @@ bool rt_tightens(const rt_contract *mine, const rt_contract *policys) {
     const rt_motion *a = &mine->motion, *b = &policys->motion;
     int named;
     return rt_same(mine->name, policys->name) && a->kind == b->kind && a->altitude == b->altitude && a->speed == b->speed &&
-           a->time == b->time && mine->timing_class == policys->timing_class && same_calls(mine->fallback, policys->fallback) &&
+           a->time == b->time && a->lowest == b->lowest && a->facing == b->facing && mine->timing_class == policys->timing_class && same_calls(mine->fallback, policys->fallback) &&
            same_parameters(mine->parameters, policys->parameters) &&
            (policys->phases.count == 0 || (mine->phases.count > 0 && subset(mine->phases, policys->phases))) &&
            mine->deadline_us <= policys->deadline_us && mine->validity_us <= policys->validity_us &&

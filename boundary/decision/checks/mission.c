@@ -52,6 +52,20 @@ static bool none_worded(const rt_prepared_policy *prepared, rt_list clauses) {
     return true;
 }
 
+/* The heights and headings of a path. Rules and clauses judge the arguments, so no height is outside of them. */
+static bool check_levels(const rt_plan *plan, const rt_motion *motion, rt_list arguments) {
+    rt_list heights = plan->heights, headings = plan->headings;
+    const uint32_t points = plan->path.count / 2;
+    int64_t value, lowest = motion->lowest == -1 ? plan->altitude : rt_int_at(arguments, (uint32_t)motion->lowest);
+    if (heights.count > 0 ? motion->lowest == -1 || heights.count != points : lowest > plan->altitude) return false;
+    while (rt_next_int(&heights, &value))
+        if (!rt_within(value, rt_max(lowest, RT_LOWEST), plan->altitude)) return false;
+    if ((headings.count > 0) != (motion->facing != RT_ALONG_LEGS) || (headings.count > 0 && headings.count != points)) return false;
+    while (rt_next_int(&headings, &value))
+        if (!rt_within(value, RT_ALONG, RT_FULL_TURN - 1)) return false;
+    return true;
+}
+
 /* The plan must match the arguments: the path that is checked is the path that is flown. */
 static bool check_plan(const rt_plan *plan, const rt_motion *motion, rt_list arguments, const rt_projection *projection) {
     rt_list path = plan->path;
@@ -66,7 +80,7 @@ static bool check_plan(const rt_plan *plan, const rt_motion *motion, rt_list arg
             return false;
         if (!rt_check_place(projection, x, y)) return false;
     }
-    return true;
+    return check_levels(plan, motion, arguments);
 }
 
 /* The path leads where the arguments say, because rules and clauses judge the arguments. */

@@ -69,12 +69,13 @@ def _legs(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
     """One leg after the other. A speed that is set before the first target in GUIDED is forgotten (recorded), so it is
     sent after it.
     """
-    height = command.altitude
-    amsl = None if seen.home_amsl is None else seen.amsl(height)
     legs: list[Stage] = []
-    for place in zip(command.geo[::2], command.geo[1::2], strict=True):
-        message = messages.position_target(system, *place, height / 1_000)
-        legs.append(flavour.leg(message, None, _GUIDED, place, height, amsl, _REPEAT_US))
+    for number, place in enumerate(zip(command.geo[::2], command.geo[1::2], strict=True)):
+        height, heading = command.height_at(number), command.heading_at(number)
+        amsl = None if seen.home_amsl is None else seen.amsl(height)
+        message = messages.position_target(system, *place, height / 1_000, heading)
+        leg = flavour.leg(message, None, _GUIDED, place, height, amsl, _REPEAT_US)
+        legs += [leg, *flavour.turning(leg, heading)]
     if not command.speed or not legs:
         return legs
     first, *others = legs

@@ -66,9 +66,10 @@ def reach_of(steps: Sequence[Invocation], policy: Policy, home: tuple[int, int])
         for plan in targets
         for x, y in zip(plan.path[::2], plan.path[1::2], strict=True)
     ]
-    high = [plan.altitude for plan in targets if plan.kind in (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)]
+    aloft = [plan for plan in targets if plan.kind in (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)]
+    high, low = [plan.altitude for plan in aloft], [plan.lowest for plan in aloft]
     returns = [policy.vehicle.return_altitude] if steps else []
-    return FlightReach(max(far, default=0), max((*high, *returns), default=0), min(high, default=None))
+    return FlightReach(max(far, default=0), max((*high, *returns), default=0), min(low, default=None))
 
 
 def airspace_reach(policy: Policy) -> FlightReach:

@@ -7,6 +7,7 @@ from functools import lru_cache
 from math import cos, hypot, radians
 
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
+from rtshcua.model.flat.mission import TURN
 from rtshcua.model.flat.zone import meridian
 
 _MM_PER_UNIT = 11.1319  # one 1e-7 degree of latitude; only for arrival, never for decisions, signatures or logs
@@ -14,6 +15,7 @@ ARRIVED = 2_000  # mm, horizontally
 LEVEL = 1_500  # mm, vertically
 CLIMBED = 1_000  # mm below the commanded height
 STILL = 700  # mm/s
+FACES = 1_000  # 1/100 degree to either side
 
 Effect = Callable[[ObservedVehicle], bool]
 Measure = Callable[[ObservedVehicle], tuple[int, ...] | None]
@@ -63,6 +65,17 @@ def arrived(latitude: int, longitude: int, altitude: int) -> Effect:
         return away <= ARRIVED and abs(seen.height - altitude) <= LEVEL
 
     return near
+
+
+def turned(there: Effect, heading: int) -> Effect:
+    """At the place, with the nose at the heading (1/100 degree from true north), confirmed by the estimator."""
+
+    def faces(seen: ObservedVehicle) -> bool:
+        if seen.heading is None or not there(seen):
+            return False
+        return abs((seen.heading - heading + TURN // 2) % TURN - TURN // 2) <= FACES
+
+    return faces
 
 
 # ---------------------------------------------------------------- remaining distances in mm: see `ExpectedProgress`

@@ -11,11 +11,15 @@ from rtshcua.adapters.vehicle.messages import Message
 from rtshcua.adapters.vehicle.observed import ObservedVehicle, Reported
 from rtshcua.adapters.vehicle.returns import ReturnLimit
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
+from rtshcua.model.flat.mission import ALONG
 from rtshcua.onboard.ports import Command
 
 #: us of link time until a mode shows, and until the motors run
 MODE_US: Final = 5_000_000
 ARM_US: Final = 8_000_000
+#: us of link time from the arrival at a point until the nose has the heading there: half a turn takes 4 s at 45 degrees
+#: a second, the slowest default
+TURNS_US: Final = 10_000_000
 #: mm: the deviation of a target before it was reported, by rounding and by a home altitude that drifts
 SAME: Final = 3_000
 #: and afterwards: in recorded flights each target was reported to the same digit until the next command, and PX4 copies
@@ -89,7 +93,7 @@ class Stage(NamedTuple):
     target that the autopilot must report. `progress`: the measure that must fall. `stops`: the vehicle must brake as
     its policy declares. `spare`: send nothing if the effect holds already. `settled` replaces `message` where the
     vehicle is in a mode of the stage already: it names no mode, so it cannot undo a pilot's choice. Its acknowledgement
-    proves little: the reported target does.
+    proves little: the reported target does. `unseen` is the reason of the failure if the effect does not show in time.
     """
 
     message: Message | None
@@ -104,6 +108,7 @@ class Stage(NamedTuple):
     stops: bool = False
     spare: bool = False
     settled: Message | None = None
+    unseen: str = "no-effect"
 
 
 Stages: TypeAlias = Callable[[Command, ObservedVehicle, int], list[Stage]]
@@ -207,6 +212,14 @@ def leg(
         message, command, effects.arrived(*place, height), modes, repeat_us=repeat_us, powered=True,
         target=ExpectedTarget(*place, amsl), progress=nearer, settled=settled,
     )  # fmt: skip
+
+
+def turning(leg: Stage, heading: int) -> list[Stage]:
+    """After a leg, wait until the nose has the heading of its end; nothing for a leg without one."""
+    if heading == ALONG or leg.done is None:
+        return []
+    done = effects.turned(leg.done, heading)
+    return [Stage(None, None, done, leg.modes, TURNS_US, powered=True, unseen="wrong-heading")]
 
 
 def returning(system: int, mode: Px4Mode | CopterMode) -> list[Stage]:

@@ -322,7 +322,16 @@ STOPPED_SHORT: Final = "stopped-short"
 _GETS_NOWHERE: Final = (STOPPED_SHORT, "no-progress")
 #: failures that also occur where a pilot flies and another sender keeps reporting our mode
 _AS_IF_OTHERS_FLEW: Final = frozenset(
-    (UNKNOWN, STOPPED_SHORT, "no-mode-report", "no-progress", "no-effect", "did-not-stop", "did-not-hold")
+    (
+        UNKNOWN,
+        STOPPED_SHORT,
+        "no-mode-report",
+        "no-progress",
+        "no-effect",
+        "wrong-heading",
+        "did-not-stop",
+        "did-not-hold",
+    )
 )
 #: The mode that a frame waits for was not reported within this time.
 MODE_UNKNOWN_US: Final = 5_000_000
@@ -836,7 +845,7 @@ class Manoeuvre:
         if self._stop is not None and self._stop.has_failed(seen, obeyed=obeyed):
             return "did-not-stop"
         if seen.up_us > self._shows_us:
-            return UNKNOWN if commander.waits else "no-effect"
+            return UNKNOWN if commander.waits else stage.unseen
         if self._progress is not None and self._progress.has_stalled(seen):
             if commander.waits:
                 return UNKNOWN

@@ -3,6 +3,7 @@
 from collections import deque
 from copy import copy
 from functools import lru_cache
+from math import radians
 from typing import Any, Final, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -11,6 +12,7 @@ from rtshcua.codec.frames import kind_of
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.layouts import COMMAND_LONG, TEXT_OCTETS
 from rtshcua.mavlink.modes import CopterMode, Px4Mode
+from rtshcua.model.flat.mission import ALONG, TURN
 from rtshcua.onboard.ports import StatusText
 
 NAN = float("nan")
@@ -59,9 +61,18 @@ def arm(system: int) -> Message:
     return command(system, ARM_DISARM, 1, 0)
 
 
-def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, speed_mm_s: int) -> Message:
-    """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode (not `in_hold`)."""
-    return _reposition(system, speed_mm_s / 1_000 if speed_mm_s else -1.0, latitude, longitude, amsl_m)
+def reposition_amsl(
+    system: int, latitude: int, longitude: int, amsl_m: float, speed_mm_s: int, heading: int = ALONG
+) -> Message:
+    """DO_REPOSITION as COMMAND_INT: 1e-7 degree, metres above mean sea level, changing the mode (not `in_hold`).
+
+    Without a heading, PX4 turns the nose along the leg (`MPC_YAW_MODE`); with one, it keeps it from the start of the
+    leg on (`Navigator::run`: `rep->current.yaw`, in radians).
+    """
+    made = _reposition(system, speed_mm_s / 1_000 if speed_mm_s else -1.0, latitude, longitude, amsl_m)
+    if heading != ALONG:
+        made.param4 = _yaw(heading)
+    return made
 
 
 def stop_here(system: int) -> Message:
@@ -88,12 +99,18 @@ def _reposition(system: int, speed_m_s: float, latitude: int, longitude: int, am
     )  # fmt: skip
 
 
-def position_target(system: int, latitude: int, longitude: int, height_m: float) -> Message:
-    """SET_POSITION_TARGET_GLOBAL_INT: a place at a height in metres above home."""
+def position_target(system: int, latitude: int, longitude: int, height_m: float, heading: int = ALONG) -> Message:
+    """SET_POSITION_TARGET_GLOBAL_INT: a place at a height in metres above home, and the heading of the nose."""
+    mask, yaw = (enums.POSITION_ONLY, 0.0) if heading == ALONG else (enums.POSITION_AND_YAW, _yaw(heading))
     return dialect.MAVLink_set_position_target_global_int_message(
-        0, system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, enums.POSITION_ONLY,
-        latitude, longitude, height_m, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, system, _AUTOPILOT, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, mask,
+        latitude, longitude, height_m, 0, 0, 0, 0, 0, 0, yaw, 0,
     )  # fmt: skip
+
+
+def _yaw(heading: int) -> float:
+    """A heading in 1/100 degree as a yaw in radians, from -pi to pi."""
+    return radians((heading if heading <= TURN // 2 else heading - TURN) / 100)
 
 
 def number_of(message: str) -> int | None:

@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from rtshcua.adapters.vehicle.suspicion import UNBROKEN_US
 from rtshcua.mavlink import enums
+from rtshcua.model.flat.mission import TURN
 
 #: ESTIMATOR_STATUS_FLAGS, EKF_STATUS_FLAGS
 ATTITUDE: Final = 0x01
@@ -181,10 +182,10 @@ class ObservedVehicle:
     """The last reports, None or 0 before the first. Angles in 1e-7 degree, lengths in mm, speeds in mm/s, times in us.
 
     Position, height and speed are the last ones that the estimator confirmed; `located` and `levelled` say whether it
-    confirms them now, for a position that is not old; `placed` is the last report, however old. `target` is the
-    autopilot's reported target. `speed_us` is the link time at which the last known speed was measured, because reports
-    that waited are old. `descent` is the sink rate and `tilt` the tilt in degrees (measured at `tilt_us`), confirmed or
-    not.
+    confirms them now, for a position that is not old; `heading` is that of the nose, 1/100 degree from true north, if
+    it is known, as of the last position; `placed` is the last report, however old. `target` is the autopilot's reported
+    target. `speed_us` is the link time at which the last known speed was measured, because reports that waited are old.
+    `descent` is the sink rate and `tilt` the tilt in degrees (measured at `tilt_us`), confirmed or not.
 
     `beats` counts heartbeats, `targets` reports of a target (the last at `target_us`) and `landings` reports of
     `landed_state`. `heard` counts the received frames of the autopilot, `numbered` the frames it had sent by then
@@ -209,6 +210,7 @@ class ObservedVehicle:
     located: bool = False
     height: int = 0
     levelled: bool = False
+    heading: int | None = None
     home_amsl: int | None = None
     speed: int | None = None
     speed_us: int = 0
@@ -460,6 +462,8 @@ class ObservedVehicle:
             self.height = message.relative_alt
             if self.located:
                 self.home_amsl = message.alt - message.relative_alt
+        turned = message.hdg < TURN and estimator.vouches_for("GLOBAL_POSITION_INT", "hdg", now_us)
+        self.heading = message.hdg if turned else None  # 65535: unknown
         known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
         # from cm/s; a vehicle with an unknown speed does not count as still
         self.speed = round(10 * hypot(message.vx, message.vy, message.vz)) if known else None

@@ -28,12 +28,14 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         case MotionKind.CLIMB:
             return _climb(command, seen, system)
         case MotionKind.FLY | MotionKind.COVER:
-            height, amsl = command.altitude, seen.amsl(command.altitude)
             legs: list[Stage] = []
-            for place in zip(command.geo[::2], command.geo[1::2], strict=True):
-                message = messages.reposition_amsl(system, *place, amsl / 1_000, command.speed)
+            for number, place in enumerate(zip(command.geo[::2], command.geo[1::2], strict=True)):
+                height, heading = command.height_at(number), command.heading_at(number)
+                amsl = seen.amsl(height)
+                message = messages.reposition_amsl(system, *place, amsl / 1_000, command.speed, heading)
                 settled = messages.in_hold(message)
-                legs.append(flavour.leg(message, messages.REPOSITION, _HOLD, place, height, amsl, settled=settled))
+                leg = flavour.leg(message, messages.REPOSITION, _HOLD, place, height, amsl, settled=settled)
+                legs += [leg, *flavour.turning(leg, heading)]
             return legs
         case _:
             return [_stop(seen, system), Stage(None, None, effects.still, _HOLD, powered=True, stops=True)]

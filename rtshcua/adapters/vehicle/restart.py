@@ -68,8 +68,8 @@ def _targets(of: CommandInForce, seen: ObservedVehicle, kept: int) -> Iterator[E
         yield ExpectedTarget(*named, within=kept, level=kept)
     if command.kind in _LEGS:
         before = None
-        for place in zip(command.geo[::2], command.geo[1::2], strict=True):
-            target = ExpectedTarget(*place, amsl)
+        for number, place in enumerate(zip(command.geo[::2], command.geo[1::2], strict=True)):
+            target = ExpectedTarget(*place, None if seen.home_amsl is None else seen.amsl(command.height_at(number)))
             if named is None or (before is not None and before.matches(named)):
                 yield target
             before = target

@@ -139,8 +139,13 @@ def plan(policy: Policy, one: Plan) -> str:
         parts.append(f"at {place(policy, *points[0])}")
     elif points:
         parts.append(f"along {len(points)} points from {place(policy, *points[0])} to {place(policy, *points[-1])}")
-    if one.altitude:
+    if one.heights:
+        levels = len(set(one.heights))
+        parts.append(f"at {levels} heights from {length(one.lowest)} to {length(max(one.heights))} above home")
+    elif one.altitude:
         parts.append(f"{length(one.altitude)} above home")
+    if one.headings:
+        parts.append("facing inward")
     if one.kind in (MotionKind.FLY, MotionKind.COVER):
         parts.append(f"at {speed(one.speed)}" if one.speed else "at the vehicle's own speed")
     return ", ".join(parts)

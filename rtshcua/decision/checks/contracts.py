@@ -19,6 +19,7 @@ from rtshcua.model.flat.contract import (
     QUANTITY,
     ZONE,
     Contract,
+    Facing,
     Link,
     MotionKind,
     Parameter,
@@ -101,9 +102,15 @@ def _motion(contract: Contract) -> Iterator[str]:
     kinds = {parameter.cell: parameter.kind for parameter in contract.parameters}
     motion = contract.motion
     yield from within("motion", motion.kind, MotionKind.HOLD, MotionKind.LAND)
-    for name, cell in (("altitude", motion.altitude), ("speed", motion.speed), ("time", motion.time)):
+    named = (
+        ("altitude", motion.altitude), ("speed", motion.speed), ("time", motion.time), ("lowest height", motion.lowest),
+    )  # fmt: skip
+    for name, cell in named:
         if cell != -1 and kinds.get(cell) != QUANTITY:
             yield f"motion: argument cell {cell} is not a {name}"
+    yield from within("facing", motion.facing, Facing.ALONG, Facing.INWARD)
+    if motion.kind != MotionKind.COVER and (motion.lowest, motion.facing) != (-1, Facing.ALONG):
+        yield "motion: only a skill that covers a zone has several heights or faces inward"
     if motion.kind in (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER) and motion.altitude == -1:
         yield "motion: a skill that moves the vehicle needs an altitude"
     if motion.kind == MotionKind.FLY and PLACE not in kinds.values():

@@ -10,9 +10,9 @@ from rtshcua.decision.tree import scope_of
 from rtshcua.decision.values import TRUE
 from rtshcua.decision.volume import HOME
 from rtshcua.decision.zones import NO_BOX, PreparedZone
-from rtshcua.model.flat.contract import PLACE, ZONE, Contract, MotionKind, SourceKind
+from rtshcua.model.flat.contract import PLACE, ZONE, Contract, Facing, Motion, MotionKind, SourceKind
 from rtshcua.model.flat.limits import MAX_INVOCATIONS, MAX_PATH, MAX_PHASES, MAX_SPEED, MAX_VALUE
-from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
+from rtshcua.model.flat.mission import ALONG, TURN, Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import HIGHEST, LOWEST, MAX_COORDINATE
 from rtshcua.model.step_number import step_words
@@ -113,6 +113,29 @@ def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterato
     yield from within("number of points", len(plan.path) // 2, 0, MAX_PATH)
     for coordinate in plan.path:
         yield from within("coordinate", coordinate, -MAX_COORDINATE, MAX_COORDINATE)
+    yield from _levels(plan, motion, arguments)
+
+
+def _levels(plan: Plan, motion: Motion, arguments: tuple[int, ...]) -> Iterator[str]:
+    """Yield the problems of the heights and headings of a path. Rules and clauses judge the arguments, so no height is
+    outside of them.
+    """
+    points, lowest = len(plan.path) // 2, plan.altitude if motion.lowest == -1 else arguments[motion.lowest]
+    if plan.heights:
+        if motion.lowest == -1:
+            yield "the skill has one height"
+        if len(plan.heights) != points:
+            yield f"{len(plan.heights)} heights; the path has {points} points"
+        for height in plan.heights:
+            yield from within("height", height, max(lowest, LOWEST), plan.altitude)
+    elif lowest > plan.altitude:
+        yield f"lowest height {lowest} is above the altitude"
+    if bool(plan.headings) != (motion.facing != Facing.ALONG):
+        yield "the headings do not match the skill's"
+    if plan.headings and len(plan.headings) != points:
+        yield f"{len(plan.headings)} headings; the path has {points} points"
+    for heading in plan.headings:
+        yield from within("heading", heading, ALONG, TURN - 1)
 
 
 def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...], declared: Sequence[PreparedZone]) -> bool:

@@ -16,7 +16,7 @@ Heights above sea are checked with the height of home that the vehicle reported.
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum, auto
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 from typing import Any, Final, NamedTuple
 
 from rtshcua.mavlink import enums, layouts
@@ -32,7 +32,7 @@ from rtshcua.mavlink.layouts import (
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.mavlink.parameters import decode, is_bytewise
 from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
-from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.mission import ALONG, TURN, Invocation, Plan
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 
@@ -141,6 +141,9 @@ _MODES: Final = {
     (ARDUPILOT, *CopterMode.LAND.parameters): frozenset({MotionKind.LAND}),
 }
 _ROUNDING: Final = 2  # mm, mm/s: the rounding of a 32-bit float
+_YAW: Final = 100  # 1e-6 radian
+#: the masks of a position target, and whether it has a yaw
+_MASKS: Final = {enums.POSITION_ONLY: False, enums.POSITION_AND_YAW: True}
 _DATUM: Final = 2_000  # mm: the tolerance of home's reported height above sea
 #: the number and frame (heights above sea) of a DO_REPOSITION, and its accepted flags
 _REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
@@ -150,11 +153,12 @@ _FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
 class MotionTarget(NamedTuple):
     """The motion of a step or link of the bundle.
 
-    `points` in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s, 0 for the vehicle's own.
+    `points` are latitude and longitude in 1e-7 degree, with the heights (mm above home) and headings (1/100 degree, or
+    `ALONG`) of the points there; `altitude` in mm above home, `speed` in mm/s, 0 for the vehicle's own.
     """
 
     kind: int
-    points: frozenset[tuple[int, int]]
+    points: Mapping[tuple[int, int], frozenset[tuple[int, int]]]
     altitude: int
     speed: int
 
@@ -169,7 +173,7 @@ class HomeHeights(NamedTuple):
 def target_of_step(invocation: Invocation, policy: Policy) -> MotionTarget:
     """The motion of a step."""
     plan = invocation.plan
-    return MotionTarget(plan.kind, _points(plan.path, policy), plan.altitude, plan.speed)
+    return MotionTarget(plan.kind, _points(plan, policy), plan.altitude, plan.speed)
 
 
 def target_of_link(link: Link, policy: Policy) -> MotionTarget:
@@ -178,7 +182,7 @@ def target_of_link(link: Link, policy: Policy) -> MotionTarget:
     motion = contract.motion
     altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
     path = _link_place(contract, link) if motion.kind == MotionKind.FLY else ()
-    return MotionTarget(motion.kind, _points(path, policy), altitude, speed)
+    return MotionTarget(motion.kind, _points(Plan(motion.kind, path, altitude, speed), policy), altitude, speed)
 
 
 def is_part_of(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
@@ -192,20 +196,34 @@ def is_part_of(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: 
     if frame.message == COMMAND_INT and autopilot == PX4:
         return _repositions(frame.fields, target, home)
     if frame.message == SET_POSITION_TARGET_GLOBAL_INT and autopilot == ARDUPILOT and target.kind in _TRAVELS:
-        x, y, z, mask, reference = layouts.of_position_target(frame.fields)
-        alone = mask == enums.POSITION_ONLY and reference == enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
-        return alone and (x, y) in target.points and _is_near(z, target.altitude)
+        x, y, z, yaw, mask, reference = layouts.of_position_target(frame.fields)
+        if reference != enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT or mask not in _MASKS:
+            return False
+        turned = yaw if _MASKS[mask] else nan
+        there = target.points.get((x, y), ())
+        return any(_is_near(z, height) and _faces(turned, heading) for height, heading in there)
     return False
 
 
 def _repositions(fields: tuple[Any, ...], target: MotionTarget, home: HomeHeights | None) -> bool:
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
-    if (number, reference, radius) != (*_REPOSITION, 0) or flags not in _FLAGS or not isnan(yaw):
-        return False  # another command, or with a loiter radius or a heading
+    if (number, reference, radius) != (*_REPOSITION, 0) or flags not in _FLAGS:
+        return False  # another command, or with a loiter radius
     if target.kind == MotionKind.HOLD:
-        return bool(x == y == enums.NO_PLACE and isnan(z) and speed == -1)
+        return bool(x == y == enums.NO_PLACE and isnan(z) and isnan(yaw) and speed == -1)
     wanted = _is_near(speed, target.speed) if target.speed else speed == -1
-    return target.kind in _TRAVELS and wanted and (x, y) in target.points and _above_sea(z, target, home)
+    if target.kind not in _TRAVELS or not wanted:
+        return False
+    there = target.points.get((x, y), ())
+    return any(_above_sea(z, height, home) and _faces(yaw, heading) for height, heading in there)
+
+
+def _faces(yaw: float, heading: int) -> bool:
+    """Whether a yaw, NaN for none, turns the nose to a heading, or along the leg."""
+    if heading == ALONG:
+        return isnan(yaw)
+    wanted = (heading if heading <= TURN // 2 else heading - TURN) * 1_745_329_252 // 10_000_000
+    return isfinite(yaw) and abs(round(yaw * 1_000_000) - wanted) <= _YAW
 
 
 def _sets_mode(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
@@ -223,7 +241,7 @@ def _takes_off(values: Sequence[Any], target: MotionTarget, autopilot: int, home
         return False
     if autopilot == PX4:  # at the current position, with the current heading
         here = (isnan(pitch) or not pitch) and not any(values[1:3]) and all(map(isnan, values[3:6]))
-        return here and _above_sea(height, target, home)
+        return here and _above_sea(height, target.altitude, home)
     return not any(values[:6]) and _is_near(height, target.altitude)
 
 
@@ -242,10 +260,10 @@ _COMMANDS: Final[Mapping[int, Callable[[Sequence[Any], MotionTarget, int, HomeHe
 }
 
 
-def _above_sea(metres: float, target: MotionTarget, home: HomeHeights | None) -> bool:
+def _above_sea(metres: float, height: int, home: HomeHeights | None) -> bool:
     if home is None or not isfinite(metres):
         return False
-    above_home = round(metres * 1_000) - target.altitude
+    above_home = round(metres * 1_000) - height
     return home.low - _DATUM <= above_home <= home.high + _DATUM
 
 
@@ -258,7 +276,11 @@ def _link_place(contract: Contract, link: Link) -> tuple[int, ...]:
     return link.arguments[cell : cell + 2]
 
 
-def _points(path: tuple[int, ...], policy: Policy) -> frozenset[tuple[int, int]]:
+def _points(plan: Plan, policy: Policy) -> dict[tuple[int, int], frozenset[tuple[int, int]]]:
     """Convert local points in mm to the coordinates that are sent, in 1e-7 degree."""
-    local = zip(path[::2], path[1::2], strict=True)
-    return frozenset(unproject(policy.projection, x, y) for x, y in local)
+    found: dict[tuple[int, int], frozenset[tuple[int, int]]] = {}
+    headings = plan.headings or (ALONG,) * (len(plan.path) // 2)
+    for (x, y, height), heading in zip(plan.points(), headings, strict=True):
+        place = unproject(policy.projection, x, y)
+        found[place] = found.get(place, frozenset()) | {(height, heading)}
+    return found

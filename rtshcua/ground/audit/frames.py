@@ -89,8 +89,9 @@ class _Allowed(NamedTuple):
 
     def or_as(self, other: "_Allowed") -> "_Allowed":
         """Return what at least one of both allows."""
-        targets, listed = {*self.targets, *other.targets}, {*self.listed, *other.listed}
-        return _Allowed(tuple(targets), tuple(listed), self.fence or other.fence)
+        more = tuple(each for each in other.targets if each not in self.targets)
+        listed = {*self.listed, *other.listed}
+        return _Allowed((*self.targets, *more), tuple(listed), self.fence or other.fence)
 
 
 class _Stated(NamedTuple):

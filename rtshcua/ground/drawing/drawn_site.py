@@ -100,7 +100,8 @@ class Site:
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
     """A step of a planned way: its number, and its path, which is empty if it stays where it is. The other members are
-    those of its plan (`rtshcua.model.flat.mission.Plan`): altitude above home, and speed (0: the vehicle chooses it).
+    those of its plan (`rtshcua.model.flat.mission.Plan`): altitude above home, speed (0: the vehicle chooses it), and
+    the height of each place, if they have their own.
     """
 
     number: int
@@ -108,6 +109,7 @@ class PlannedStep:
     motion: MotionKind = MotionKind.HOLD
     altitude: int = 0
     speed: int = 0
+    heights: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,9 +228,9 @@ def _targets(step: PlannedStep, at: SitePoint, site: Site) -> Iterator[tuple[Sit
             yield SitePoint(*home, 0), 0, high
             return
         case _:
-            for place in step.path:
-                to = SitePoint(*place, step.altitude)
-                yield to, min(height, step.altitude), max(height, step.altitude)
-                height = step.altitude
+            for place, level in zip(step.path, step.heights or (step.altitude,) * len(step.path), strict=True):
+                to = SitePoint(*place, level)
+                yield to, min(height, level), max(height, level)
+                height = level
             return
     yield to, min(height, to.height), max(height, to.height)

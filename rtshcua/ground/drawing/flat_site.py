@@ -79,6 +79,7 @@ def way_of(mission: Mission) -> PlannedWay:
                 MotionKind(each.plan.kind),
                 each.plan.altitude,
                 each.plan.speed,
+                each.plan.heights,
             )
             for each in mission.invocations
         ),

@@ -9,7 +9,9 @@ KEYWORDS: Mapping[str, str] = {
     "enum": "A set of named values, ordered by their numbers; `= NAME` mirrors a MAVLink enumeration.",
     "signal": "A value that the vehicle reports: its type, and the MAVLink field from which it is read.",
     "unknown": "Raw values that mean `not known`; in a test, a missing value. Unknown never permits anything.",
-    "every": "`every 100 ms`: the sender reports the signal this often, whatever is requested.",
+    "every": "`every 100 ms`: the sender reports the signal this often, whatever is requested; in a motion: the "
+    "greatest distance of two heights of a path.",
+    "facing": "`facing inward`: at each point of a path around something, the nose points to its middle.",
     "stale": "`stale after 2 s`: an older value is unknown.",
     "zone": "A set of places without its border: an outline, with optional floor, ceiling, entry and times.",
     "circle": "`circle(centre, radius)`: the places nearer to the centre than the radius.",

@@ -347,7 +347,9 @@ class _OccurrenceFinder:
         yield from self.within(tuple(each.size for each in skill.sized), sizes)
         if skill.motion is not None:
             motion = skill.motion
-            for name in (motion.target, motion.altitude, motion.speed, motion.pattern, motion.time):
+            for name in (
+                motion.target, motion.lowest, motion.altitude, motion.every, motion.speed, motion.pattern, motion.time
+            ):  # fmt: skip
                 if name is not None:
                     yield Occurrence(name.span, NameTarget(NameKind.PARAMETER, name.text, owner))
         yield from self.contract(skill, scope)

@@ -108,6 +108,7 @@ KINDS: Final[Mapping[type, Mapping[str, FieldKind]]] = {
     PlannedWay: {"name": _.NAME, "steps": _.PLACE},
     PlannedStep: {
         "number": _.MACHINE, "path": _.PLACE, "motion": _.MACHINE, "altitude": _.HEIGHT, "speed": _.PLACE,
+        "heights": _.HEIGHT,
     },
 }  # fmt: skip
 

@@ -48,8 +48,8 @@ _PLAIN_ITEMS = (
     "identity", "home", "speed", "climb", "position_error", "endurance", "reserve", "cells", "clock", "time_zone",
     "elevation", "return_at", "brakes", "speeds", "accelerates", "wind", "not_fitted",
     # of skills and steps
-    "climb_to", "fly_to", "cover_area", "hold_for", "stay", "timing_class", "deadline", "duration", "grace",
-    "require", "assume", "maintain", "fallback", "energy", "record",
+    "climb_to", "fly_to", "cover_area", "cover_levels", "hold_for", "stay", "timing_class", "deadline", "duration",
+    "grace", "require", "assume", "maintain", "fallback", "energy", "record",
     # of missions
     "intent", "proposed", "most_steps",
     # of nominals and tests

@@ -16,6 +16,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.symbols import suggestion
+from rtshcua.ground.geometry.levels import LEAST_STEP, heights_between, levelled
+from rtshcua.ground.geometry.polygons import Point
 from rtshcua.ground.geometry.shapes import MultiPolygon, parts
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, survey
 from rtshcua.ground.lower.conditions import ConditionPlace
@@ -25,7 +27,7 @@ from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.policy_checks import check_step_fitted
 from rtshcua.ground.lower.tables import JointSourceTable, SourceTable
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, SourceKind
+from rtshcua.model.flat.contract import PLACE, Contract, Facing, MotionKind, SourceKind
 from rtshcua.model.flat.limits import MAX_CLAUSES, MAX_INVOCATIONS, MAX_PATH, MAX_PHASES
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.ir.missions import MissionDecl, Overrides, Phase, Step
@@ -33,6 +35,7 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
 from rtshcua.model.ir.skills import SkillDecl
+from rtshcua.model.quantity import Dimension, display
 
 
 class LoweredMission(NamedTuple):
@@ -304,13 +307,53 @@ class StepLowering:
         plan = straight_plan(contract, arguments)
         if plan.kind != MotionKind.COVER:
             return plan
-        path = self._survey_path(step, skill, bound, plan.altitude)
-        return None if path is None else replace(plan, path=path)
+        heights = self._heights(step, skill, bound, plan.altitude)
+        if heights is None:
+            return None
+        points = self._survey_path(step, skill, bound, min(heights, default=plan.altitude))
+        if points is None:
+            return None
+        path = levelled(points, heights, inward=contract.motion.facing == Facing.INWARD)
+        if len(path.points) > MAX_PATH:
+            zone = argument_span(self._context, step, _target(skill))
+            self._context.report.add(
+                codes.TOO_MANY,
+                step.span,
+                f"its path has {len(path.points)} points, but at most {MAX_PATH} fit on board",
+                labels=[(zone, "the area")],
+            )
+            return None
+        flat = tuple(coordinate for point in path.points for coordinate in point)
+        return replace(plan, path=flat, heights=path.heights, headings=path.headings)
+
+    def _heights(self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int) -> tuple[int, ...] | None:
+        """Return the heights of a `cover` motion at several heights, or None after a finding; empty for one at its
+        altitude.
+        """
+        assert skill.motion is not None
+        if skill.motion.lowest is None:
+            return ()
+        names = [parameter.name.text for parameter in skill.parameters]
+        lowest = bound[names.index(skill.motion.lowest.text)]
+        every = None if skill.motion.every is None else bound[names.index(skill.motion.every.text)]
+        assert isinstance(lowest, int)
+        assert every is None or isinstance(every, int)
+        if lowest > altitude:
+            what = f"the lowest height, {display(lowest, Dimension.LENGTH)}, is above the highest"
+            at = skill.motion.lowest
+        elif every is not None and every < LEAST_STEP:
+            at, least = skill.motion.every or skill.motion.lowest, display(LEAST_STEP, Dimension.LENGTH)
+            what = f"its heights are {display(every, Dimension.LENGTH)} apart; the least distance is {least}"
+        else:
+            same = lowest == altitude
+            return () if same else heights_between(lowest, altitude, every or altitude - lowest)
+        self._context.report.add(codes.BAD_LEVELS, argument_span(self._context, step, at.text), what)
+        return None
 
     def _survey_path(
         self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int
-    ) -> tuple[int, ...] | None:
-        """Return the survey path of a `cover` motion, or None after a finding."""
+    ) -> tuple[Point, ...] | None:
+        """Return the survey path of a `cover` motion at one height, or None after a finding."""
         assert skill.motion is not None
         names = [parameter.name.text for parameter in skill.parameters]
         zone = bound[names.index(_target(skill))]
@@ -340,15 +383,7 @@ class StepLowering:
                 labels=[(zone.name.span, "declared here")],
             )
             return None
-        if len(points) > MAX_PATH:
-            self._context.report.add(
-                codes.TOO_MANY,
-                step.span,
-                f"the path over `{zone.name.text}` has {len(points)} points, but at most {MAX_PATH} fit on board",
-                labels=[(zone.name.span, "declared here")],
-            )
-            return None
-        return tuple(coordinate for point in points for coordinate in point)
+        return points
 
 
 def _timed(skills: Contract, own: Overrides) -> Contract:

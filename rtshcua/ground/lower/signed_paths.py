@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.decision.contracts import first_cell
+from rtshcua.ground.geometry.levels import LevelledPath, levelled
 from rtshcua.ground.geometry.polygons import Point, path_length
 from rtshcua.ground.geometry.shapes import shape_of
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, PATTERNS, survey
-from rtshcua.model.flat.contract import CHOICE, ZONE, MotionKind
+from rtshcua.model.flat.contract import CHOICE, ZONE, Facing, MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 
@@ -21,12 +22,13 @@ class PlannedPath(NamedTuple):
     """The path that the planner computes instead of a signed one.
 
     `points` is the number of its corners (0: no path), `length` its length in mm, and `apart` the Hausdorff distance of
-    the two paths in mm.
+    the two paths in mm. `levels`: the signed path has the same places in the same order, at other heights or headings.
     """
 
     points: int
     length: int
     apart: int
+    levels: bool = False
 
 
 def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | None:
@@ -34,11 +36,17 @@ def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | Non
     if one.plan.kind != MotionKind.COVER:
         return None
     signed = tuple(zip(one.plan.path[::2], one.plan.path[1::2], strict=True))
+    its = LevelledPath(signed, one.plan.heights, one.plan.headings)
+    heights, inward = tuple(dict.fromkeys(one.plan.heights)), one.contract.motion.facing == Facing.INWARD
     found: tuple[Point, ...] | None = None
     for pattern in _patterns(policy, one):
-        found = _survey(policy, one, pattern)
-        if found is not None and signed in (found, found[::-1]):
+        once = _survey(policy, one, pattern)
+        ways = [levelled(each, heights, inward=inward) for each in ((once, once[::-1]) if once else ())]
+        if its in ways:
             return None
+        if signed in (way.points for way in ways):
+            return PlannedPath(len(signed), path_length(signed), 0, levels=True)
+        found = ways[0].points if ways else None
     return PlannedPath(0, 0, 0) if found is None else PlannedPath(len(found), path_length(found), _apart(signed, found))
 
 
@@ -66,7 +74,7 @@ def _survey(policy: Policy, one: Invocation, pattern: str) -> tuple[Point, ...] 
     shape = shape_of(policy.zones[number]) if 0 <= number < policy.declared else None
     if shape is None:
         return None
-    return survey(shape, pattern, one.plan.altitude, policy.vehicle.position_error, None)
+    return survey(shape, pattern, one.plan.lowest, policy.vehicle.position_error, None)
 
 
 def _apart(one: tuple[Point, ...], other: tuple[Point, ...]) -> int:

@@ -227,7 +227,7 @@ def _way_home(proof: ProofContext, mission: Mission) -> int:
     squares = (x * x + y * y for plan in plans for x, y in zip(plan.path[::2], plan.path[1::2], strict=True))
     distance = isqrt(max(squares, default=0)) + 1 + vehicle.position_error
     slowest = min((plan.speed for plan in plans if plan.speed), default=0)
-    heights = [plan.altitude for plan in plans if plan.kind in _ALOFT] or [0]
+    heights = [height for plan in plans if plan.kind in _ALOFT for height in (plan.lowest, plan.altitude)] or [0]
     near = home_us(vehicle, speeds, vehicle.position_error, (0, max(heights)), slowest)
     far = home_us(vehicle, speeds, distance, (min(heights), max(heights)), slowest)
     return charge(speeds, max(near, far))

@@ -68,7 +68,7 @@ def place_after(invocation: PreparedInvocation, start: StartPlace) -> StartPlace
         case MotionKind.HOLD:
             return start
         case _:
-            return StartPlace(x, y, plan.altitude, aloft=True)
+            return StartPlace(x, y, plan.last_height, aloft=True)
 
 
 def places_after(

@@ -38,11 +38,15 @@ from rtshcua.ground.prove.step_starts import StartPlace, planned
 from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind
 from rtshcua.model.flat.limits import FULL, MAX_SPEED
+from rtshcua.model.flat.mission import ALONG, TURN
+from rtshcua.model.flat.policy import Speeds
 from rtshcua.model.quantity import Dimension, display
 
 SECOND_US: Final = 1_000_000
 _MILLISECOND: Final = 1_000
 _METRE: Final = 1_000  # mm
+#: the least rate at which a nose turns, 1/100 degree a second; the defaults of PX4 and ArduCopter are faster
+_TURN_RATE: Final = 4_500
 #: a fix: the span to replace, the new text, and its title
 _Fix = tuple[Span, str, str]
 #: the messages in which autopilots report the wind
@@ -110,6 +114,8 @@ def _nearer(proof: ProofContext, step: MissionStep, here: int, takes: Callable[[
     span = None if parameter is None else argument_span(proof.context, step.declared, parameter.name)
     if parameter is None or span is None or span == step.span or not parameter.low <= here <= parameter.high:
         return None
+    if step.flat.plan.heights:
+        return None  # the highest height does not alone determine the time
     sign = 1 if here > planned_height else -1
     least, most = 0, abs(here - planned_height) // _METRE
     if takes(planned_height + sign * most * _METRE) > fits:
@@ -154,7 +160,7 @@ def _step_us(
     """Return the longest time of a step in us from its start to its end at an altitude."""
     flat, vehicle, speeds = invocation.invocation, proof.policy.vehicle, proof.speeds
     plan = flat.plan
-    height = sinking_us(speeds, start.height - altitude) + rising_us(speeds, altitude - start.height)
+    height = _between_us(speeds, start.height, altitude)
     match plan.kind:
         case MotionKind.HOLD:
             cell = flat.contract.motion.time
@@ -168,7 +174,28 @@ def _step_us(
             return BEGINS + SETTLES + landing_us(speeds, start.height)
     points: list[Point] = [(start.x, start.y), *zip(plan.path[::2], plan.path[1::2], strict=True)]
     speed = over_ground(speeds, plan.speed or min(speeds.cruise, slowest or speeds.cruise), wind)
-    return BEGINS + sum(leg_us(speeds, length(a, b) + 1, speed) for a, b in pairwise(points)) + height + SETTLES
+    legs = [leg_us(speeds, length(a, b) + 1, speed) for a, b in pairwise(points)]
+    if plan.headings:
+        legs = list(map(max, legs, _turns_us(plan.headings)))
+    if plan.heights:
+        height = sum(_between_us(speeds, a, b) for a, b in pairwise((start.height, *plan.heights)))
+    return BEGINS + sum(legs) + height + SETTLES
+
+
+def _turns_us(headings: Sequence[int]) -> list[int]:
+    """Return the duration of the turn of the nose to each heading, to the first from any other. It turns while it flies
+    a leg, so a leg takes longer only if its turn does.
+    """
+    turns = (
+        TURN // 2 if ALONG in pair else abs((pair[1] - pair[0] + TURN // 2) % TURN - TURN // 2)
+        for pair in pairwise((ALONG, *headings))
+    )
+    return [BEGINS + -(-turn * SECOND_US // _TURN_RATE) for turn in turns]
+
+
+def _between_us(speeds: Speeds, here: int, there: int) -> int:
+    """Return the duration of a climb or a descent."""
+    return rising_us(speeds, there - here) + sinking_us(speeds, here - there)
 
 
 def _is_reported(proof: ProofContext, contract: Contract) -> bool:

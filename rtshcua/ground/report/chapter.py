@@ -211,6 +211,7 @@ def _step(step: Invocation, mission: Mission, policy: Policy) -> StepView:
         altitude=step.plan.altitude,
         motion=MotionKind(step.plan.kind).name.lower(),
         speed=step.plan.speed,
+        heights=step.plan.heights,
     )
 
 

@@ -168,10 +168,11 @@ def _skill(contract: Contract, policy: Policy) -> Mapping[str, Callable[[], str]
     phases = f", only in the phase {named(contract.phases, 'or')}" if contract.phases else ""
     motion = contract.motion
     cells = {each.cell: name(each.name) for each in contract.parameters}
-    given = [cells[cell] for cell in (motion.altitude, motion.speed, motion.time) if cell in cells]
+    given = [cells[cell] for cell in (motion.lowest, motion.altitude, motion.speed, motion.time) if cell in cells]
+    motion_given = (f" with {listed(given)}" if given else "") + (" facing inward" if motion.facing else "")
     return {
         "parameters": lambda: "; ".join(map(_parameter, contract.parameters)),
-        "motion": lambda: name(MotionKind(motion.kind).name.lower()) + (f" with {listed(given)}" if given else ""),
+        "motion": lambda: name(MotionKind(motion.kind).name.lower()) + motion_given,
         "class": lambda: name(TimingClass(contract.timing_class).name.lower()),
         "deadline": lambda: _time(contract.deadline_us),
         "valid": lambda: f"for {_time(contract.validity_us)}{phases}",

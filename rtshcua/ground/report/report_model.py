@@ -159,6 +159,7 @@ class StepView:
     altitude: int
     motion: str
     speed: int
+    heights: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +179,9 @@ class MissionView:
         return PlannedWay(
             self.name,
             tuple(
-                PlannedStep(step.number, step.path, MotionKind[step.motion.upper()], step.altitude, step.speed)
+                PlannedStep(
+                    step.number, step.path, MotionKind[step.motion.upper()], step.altitude, step.speed, step.heights
+                )
                 for step in self.steps
             ),
         )

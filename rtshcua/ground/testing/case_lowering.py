@@ -168,9 +168,11 @@ def _with_arguments(mission: Mission, arguments: tuple[int, ...]) -> Mission:
     if arguments == invocation.arguments:
         return mission
     plan, contract = invocation.plan, invocation.contract
+    altitude = _cell(contract, arguments, "altitude", plan.altitude)
+    lowest = _cell(contract, arguments, "lowest", plan.lowest)
     plan = replace(
-        plan, altitude=_cell(contract, arguments, "altitude", plan.altitude),
-        speed=_cell(contract, arguments, "speed", plan.speed),
+        plan, altitude=altitude, speed=_cell(contract, arguments, "speed", plan.speed),
+        heights=tuple(min(max(height, lowest), altitude) for height in plan.heights),
     )  # fmt: skip
     return replace(mission, invocations=(replace(invocation, arguments=arguments, plan=plan),))
 

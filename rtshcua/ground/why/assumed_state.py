@@ -62,7 +62,7 @@ def place_before(invocations: Sequence[PreparedInvocation], step: int) -> tuple[
         if plan.kind in (MotionKind.HOME, MotionKind.LAND):
             height = 0
         elif plan.kind != MotionKind.HOLD:
-            height = plan.altitude
+            height = plan.last_height
     return x, y, height
 
 

@@ -1,9 +1,10 @@
 """Skill contracts, lowered."""
 
 from enum import IntEnum
+from typing import ClassVar
 
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.struct import Flat
+from rtshcua.model.flat.struct import Extended, Flat
 
 
 class TimingClass(IntEnum):
@@ -62,13 +63,28 @@ class Link(Flat, frozen=True):
     end: int
 
 
-class Motion(Flat, frozen=True):
-    """The kind of motion, and the argument cells of its altitude, its speed and its holding time (-1: none)."""
+class Facing(IntEnum):
+    """Where the nose points on a survey path."""
+
+    ALONG = 0  # along each leg
+    INWARD = 1  # to the middle of the zone
+
+
+class Motion(Extended, frozen=True):
+    """The kind of motion, and the argument cells of its altitude, its speed and its holding time (-1: none).
+
+    `lowest` is the argument cell of the lowest height of a survey path at several heights, whose highest one is the
+    altitude (-1: all points are at the altitude). `facing` is a `Facing`.
+    """
+
+    LEAST: ClassVar[int] = 4
 
     kind: int
     altitude: int
     speed: int
     time: int = -1
+    lowest: int = -1
+    facing: int = 0
 
 
 class Contract(Flat, frozen=True):

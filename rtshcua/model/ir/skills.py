@@ -21,8 +21,9 @@ class ParameterDecl(Node):
 class MotionDecl(Node):
     """Where the skill takes the vehicle, so that its planned volume is known before the flight.
 
-    `climb to altitude` straight up; `fly to target at altitude`; `cover area at altitude` by a survey path; `fly
-    home` and land there; `hold` position; `land` here.
+    `climb to altitude` straight up; `fly to target at altitude`; `cover area at altitude` by a survey path; `cover
+    area from lowest to altitude every step` by one path at several heights; `fly home` and land there; `hold`
+    position; `land` here.
     """
 
     kind: Literal["climb", "fly", "cover", "home", "hold", "land"]
@@ -31,6 +32,9 @@ class MotionDecl(Node):
     speed: Name | None  # a parameter of type speed
     pattern: Name | None  # a choice parameter
     time: Name | None = None  # a parameter of type duration: `hold for time`
+    lowest: Name | None = None  # a parameter of type altitude; `altitude` is then the highest
+    every: Name | None = None  # a parameter of type length: the greatest distance of two heights
+    facing: Literal["inward"] | None = None
 
 
 class ArgumentValue(Node):

@@ -6,9 +6,9 @@ parameters that switch ArduCopter's fence on. Nothing else is housekeeping: no m
 or manual control. Other parameters are set only as listed in a preparation (`written`, `frames.py`).
 
 A frame carries out a command if every field that the autopilot acts on has the value in the command: the number,
-each parameter, the frame of reference, the point, the height, the speed, the mode. Values must be equal except for
-the rounding of a 32-bit float and the height of home, which the autopilot's own estimate moves. The rules are the
-same for every adapter, next to the documented behaviour of the autopilots.
+each parameter, the frame of reference, the point, its height and heading, the speed, the mode. Values must be equal
+except for the rounding of a 32-bit float and the height of home, which the autopilot's own estimate moves. The rules
+are the same for every adapter, next to the documented behaviour of the autopilots.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,6 +21,7 @@ from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG, HEARTBEAT, LAYOUT
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 from rtshcua.mavlink.parameters import bits_of, decode
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import ALONG, TURN
 from rtshcua.model.flat.zone import SHIFT, meridian
 from rtshcua.onboard.ports import Command
 
@@ -194,10 +195,17 @@ _ROUNDING: Final = 2  # mm, mm/s
 #: the next one; the adapters count it as arrived within 2 m
 NEAR: Final = 449
 
+#: mm: the same for the height of a point, on a path at several heights; the adapters count 1.5 m as arrived
+NEAR_LEVEL: Final = 3_000
+#: 1e-6 radian, about half of 1/100 degree
+_YAW_ROUNDING: Final = 100
+
 #: command and frame of reference (heights above mean sea level) of a DO_REPOSITION,
 _REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
 #: and its flags: change to Hold, or only act in Hold, which overrides no pilot who chose another mode
 _FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
+#: the mask of a position target with a heading
+_TURNED: Final = enums.POSITION_AND_YAW
 _NOWHERE: Final = (enums.NO_PLACE, enums.NO_PLACE)
 
 _places: Final = {
@@ -247,9 +255,9 @@ def carries_out(frame: Frame, command: Command, autopilot: int, home_amsl: int |
         case layouts.COMMAND_INT if autopilot == PX4 and command.kind == MotionKind.HOLD:
             return _stop(frame.fields)
         case layouts.COMMAND_INT:
-            return autopilot == PX4 and _reposition(frame.fields, command, home_amsl)
+            return autopilot == PX4 and _reposition(frame, command, home_amsl)
         case layouts.SET_POSITION_TARGET_GLOBAL_INT:
-            return autopilot == ARDUPILOT and _position_target(frame.fields, command)
+            return autopilot == ARDUPILOT and _position_target(frame, command)
     return False
 
 
@@ -258,6 +266,23 @@ def point_of(frame: Frame) -> tuple[int, int] | None:
     place = _places.get(frame.message)
     point: tuple[int, int] | None = None if place is None else place(frame.fields)
     return None if point == _NOWHERE else point
+
+
+def leads_to(frame: Frame, command: Command, number: int, home_amsl: int | None) -> bool:
+    """Whether place, height and heading in a frame that carries out a command are those of a point of its path."""
+    if not 0 <= number < len(command.geo) // 2:
+        return False
+    heading, height = command.heading_at(number), command.height_at(number)
+    if frame.message == COMMAND_INT:
+        _, _, _, yaw, x, y, z, _, _ = layouts.of_command_int(frame.fields)
+        turned = isnan(yaw) if heading == ALONG else _is_heading(yaw, heading)
+        raised = home_amsl is not None and _is(z, home_amsl + height, DATUM_MOVES)
+    else:
+        x, y, z, yaw, mask, _ = layouts.of_position_target(frame.fields)
+        along = heading == ALONG
+        turned = mask == enums.POSITION_ONLY if along else mask == _TURNED and _is_heading(yaw, heading)
+        raised = _is(z, height)
+    return turned and raised and (x, y) == command.geo[2 * number : 2 * number + 2]
 
 
 def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
@@ -298,13 +323,12 @@ def _long(fields: _Fields, command: Command, autopilot: int, home_amsl: int | No
     return False
 
 
-def _reposition(fields: _Fields, command: Command, home_amsl: int | None) -> bool:
-    """DO_REPOSITION: a circle's radius, or a heading of its own, would be another manoeuvre."""
-    speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
-    there = _is_point(x, y, command) and _is_above_sea(z, command, home_amsl) and isnan(yaw)
+def _reposition(frame: Frame, command: Command, home_amsl: int | None) -> bool:
+    """DO_REPOSITION: a circle's radius would be another manoeuvre."""
+    speed, flags, radius, _, x, y, _, number, reference = layouts.of_command_int(frame.fields)
     as_fast = radius == 0 and (_is_speed(speed, command) if command.speed else speed == -1)
     repositions = (number, reference) == _REPOSITION and flags in _FLAGS
-    return repositions and command.kind in _TRAVELS and there and as_fast
+    return repositions and command.kind in _TRAVELS and as_fast and _leads_there(frame, x, y, command, home_amsl)
 
 
 def _stop(fields: _Fields) -> bool:
@@ -318,17 +342,17 @@ def _stop(fields: _Fields) -> bool:
     return repositions and nowhere and (speed, radius) == (-1, 0)
 
 
-def _position_target(fields: _Fields, command: Command) -> bool:
+def _position_target(frame: Frame, command: Command) -> bool:
     """SET_POSITION_TARGET_GLOBAL_INT; fields that the mask excludes may have any value."""
-    x, y, z, mask, reference = layouts.of_position_target(fields)
-    there = _is_point(x, y, command) and _is(z, command.altitude)
-    above_home = (mask, reference) == (enums.POSITION_ONLY, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-    return above_home and command.kind in _TRAVELS and there
+    x, y, _, _, _, reference = layouts.of_position_target(frame.fields)
+    above_home = reference == enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+    return above_home and command.kind in _TRAVELS and _leads_there(frame, x, y, command, None)
 
 
-def _is_point(x: int, y: int, command: Command) -> bool:
-    """A point of the command's path, in 1e-7 degree."""
-    return (x, y) in zip(command.geo[::2], command.geo[1::2], strict=True)
+def _leads_there(frame: Frame, x: int, y: int, command: Command, home_amsl: int | None) -> bool:
+    """Whether the target is some point of the command's path; places are in 1e-7 degree."""
+    places = enumerate(zip(command.geo[::2], command.geo[1::2], strict=True))
+    return any(place == (x, y) and leads_to(frame, command, number, home_amsl) for number, place in places)
 
 
 def _is_speed(metres_per_second: float, command: Command) -> bool:
@@ -341,6 +365,17 @@ def _is_above_sea(metres: float, command: Command, home_amsl: int | None) -> boo
 
 def _is(metres: float, millimetres: int, within: int = _ROUNDING) -> bool:
     return isfinite(metres) and abs(round(metres * 1_000) - millimetres) <= within
+
+
+def _is_heading(yaw: float, heading: int) -> bool:
+    """Whether a yaw in radians, from -pi to pi, is a heading in 1/100 degree."""
+    return isfinite(yaw) and abs(round(yaw * 1_000_000) - microradians(heading)) <= _YAW_ROUNDING
+
+
+def microradians(heading: int) -> int:
+    """A heading in 1/100 degree as a yaw in 1e-6 radian, from -pi to pi; rounded down."""
+    turned = heading if heading <= TURN // 2 else heading - TURN
+    return turned * 1_745_329_252 // 10_000_000
 
 
 def _zero(*parameters: float) -> bool:

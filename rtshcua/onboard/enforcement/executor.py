@@ -27,7 +27,7 @@ from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
 #: a command without its token, and until when it may be sent
-_Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool]
+_Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool, tuple[int, ...], tuple[int, ...]]
 #: the commands of a mission, by kind, step and link
 Made = dict[tuple[int, int, int], _Made]
 
@@ -107,7 +107,8 @@ class Commands:
     def _of_step(self, invocation: Invocation) -> _Made:
         plan, contract = invocation.plan, invocation.contract
         held_us = _hold_us(contract, invocation.arguments)
-        return contract.name, plan.kind, plan.path, self._geo(plan.path), plan.altitude, plan.speed, held_us, True
+        geo, levels = self._geo(plan.path), (plan.heights, plan.headings)
+        return contract.name, plan.kind, plan.path, geo, plan.altitude, plan.speed, held_us, True, *levels
 
     def _of_link(self, link: Link) -> _Made:
         contract = self._policy.contracts[link.skill]
@@ -118,7 +119,7 @@ class Commands:
             path = link.arguments[cell : cell + 2]
         altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
         held_us = 0 if link.limit_us else _hold_us(contract, link.arguments)  # the link's own time counts
-        return contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us, False
+        return contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us, False, (), ()
 
     def _geo(self, path: Sequence[int]) -> tuple[int, ...]:
         projection = self._policy.projection

@@ -127,6 +127,7 @@ class FrameSession:
         #: whether a frame was sent or signed ahead since the last permit
         self.let_out = False
         self._here: tuple[int, int] | None = None  # 1e-7 degree
+        self._above_home = 0  # mm
         self._started = False  # a session was opened: fences are no longer changed
         self._system = 0
         self._autopilot = 0  # MAV_AUTOPILOT
@@ -189,7 +190,7 @@ class FrameSession:
                 self._armed_us = now_us
         elif heard.message == GLOBAL_POSITION_INT and heard.system == self._system:
             latitude, longitude, amsl, above_home = _position(heard.fields)
-            self._here = latitude, longitude
+            self._here, self._above_home = (latitude, longitude), above_home
             home_amsl, settled = amsl - above_home, self._settled_amsl  # mm
             if settled is None or abs(home_amsl - settled) <= HOME_MOVES:
                 self._home_amsl = home_amsl
@@ -279,8 +280,9 @@ class FrameSession:
             return refused
         if not allow_list.carries_out(frame, command, self._autopilot, self._home_amsl):
             return NOT_COVERED
-        point = allow_list.point_of(frame)  # the others wait until the vehicle is there
-        return None if point is None or point == command.geo[:2] else OUT_OF_ORDER
+        if allow_list.point_of(frame) is None or allow_list.leads_to(frame, command, 0, self._home_amsl):
+            return None
+        return OUT_OF_ORDER  # the others wait until the vehicle is there
 
     def _refuse_motion(self, frame: Frame, now_us: int) -> Refusal | None:
         session = self._session
@@ -290,14 +292,18 @@ class FrameSession:
             return NOT_COVERED
         if not session.begun and now_us > session.command.not_after_us:
             return LATE
-        point = allow_list.point_of(frame)
-        if point is not None:
-            path = tuple(zip(session.command.geo[::2], session.command.geo[1::2], strict=True))
-            there = session.leg < 0 or allow_list.is_near(self._here, path[session.leg])  # else it would cut the corner
+        if allow_list.point_of(frame) is not None:
+            there = session.leg < 0 or self._is_at(session.command, session.leg)  # else it would cut the corner
             legs = (session.leg, session.leg + 1) if there else (session.leg,)
-            turn = [leg for leg in legs if 0 <= leg < len(path) and path[leg] == point]
+            turn = [leg for leg in legs if allow_list.leads_to(frame, session.command, leg, self._home_amsl)]
             if not turn:
                 return OUT_OF_ORDER
             session.leg = turn[0]
         session.begun = self.let_out = True
         return None
+
+    def _is_at(self, command: Command, number: int) -> bool:
+        """Whether the vehicle is close enough to a point of the path for the next leg to begin."""
+        latitude, longitude = command.geo[2 * number : 2 * number + 2]
+        level = not command.heights or abs(self._above_home - command.heights[number]) <= allow_list.NEAR_LEVEL
+        return level and allow_list.is_near(self._here, (latitude, longitude))

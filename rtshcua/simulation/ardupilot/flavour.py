@@ -5,7 +5,7 @@ uploaded there. It does not check waypoints against the fence, neither at upload
 """
 
 from collections.abc import Callable
-from math import inf
+from math import inf, isfinite
 from types import MappingProxyType
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -281,6 +281,8 @@ class ArduCopter(Flavour):
             target = Point(*a.home.local(message.lat_int, message.lon_int), up)
             if a.fence.allows(target):
                 a.vehicle.go_to(target)
+                if not message.type_mask & mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE and isfinite(message.yaw):
+                    a.vehicle.turn_to(message.yaw)
 
     def on_local_target(self, a: Autopilot, message: Message) -> None:
         """Fly to a target in metres from home, north, east and down, or at its velocity, under the same conditions."""

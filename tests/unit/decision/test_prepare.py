@@ -132,6 +132,19 @@ POLICIES: list[tuple[Policy, str]] = [
     (contract(INSPECT, motion=Motion(3, 0, 3)), "skill `inspect_area`: motion: argument cell 0 is not a altitude"),
     (contract(INSPECT, motion=Motion(3, 1, 9)), "skill `inspect_area`: motion: argument cell 9 is not a speed"),
     (
+        contract(INSPECT, motion=Motion(3, 1, 3, lowest=0)),
+        "skill `inspect_area`: motion: argument cell 0 is not a lowest height",
+    ),
+    (contract(INSPECT, motion=Motion(3, 1, 3, facing=2)), "skill `inspect_area`: facing 2 is not in 0..1"),
+    (
+        contract(GOTO, motion=Motion(2, 2, -1, lowest=2)),
+        "skill `goto`: motion: only a skill that covers a zone has several heights or faces inward",
+    ),
+    (
+        contract(GOTO, motion=Motion(2, 2, -1, facing=1)),
+        "skill `goto`: motion: only a skill that covers a zone has several heights or faces inward",
+    ),
+    (
         contract(INSPECT, motion=Motion(3, -1, 3)),
         "skill `inspect_area`: motion: a skill that moves the vehicle needs an altitude",
     ),
@@ -274,6 +287,8 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (step(arguments=(1, 20 * M, 0, 1 << 53)), "argument 9007199254740992 is not in"),
     (mine(name="other"), "`name` is looser than in the policy"),
     (mine(motion=Motion(3, 1, -1)), "`motion` is looser than in the policy"),
+    (mine(motion=Motion(3, 1, 3, lowest=1)), "`motion` is looser than in the policy"),
+    (mine(motion=Motion(3, 1, 3, facing=1)), "`motion` is looser than in the policy"),
     (mine(timing_class=0), "`timing class` is looser than in the policy"),
     (mine(fallback=S.contract.fallback[:2]), "`fallback` is looser than in the policy"),
     (

@@ -22,7 +22,7 @@ NEWER = {
     "COMMAND_CANCEL": 80, "PROTOCOL_VERSION": 300, "CONTROL_STATUS": 512, "MAV_CMD_REQUEST_OPERATOR_CONTROL": 32_100,
     "CANCELLED": 6,
 }  # fmt: skip
-OWN_WORDS = {"POSITION_ONLY", "NO_PLACE"}
+OWN_WORDS = {"POSITION_ONLY", "POSITION_AND_YAW", "NO_PLACE"}
 IGNORED = ("VX", "VY", "VZ", "AX", "AY", "AZ", "YAW", "YAW_RATE")
 
 
@@ -71,6 +71,7 @@ def test_results_of_commands_are_the_dialects() -> None:
 
 def test_position_mask_ignores_all_other_fields() -> None:
     assert sum(getattr(dialect, f"POSITION_TARGET_TYPEMASK_{each}_IGNORE") for each in IGNORED) == enums.POSITION_ONLY
+    assert enums.POSITION_ONLY - enums.POSITION_AND_YAW == dialect.POSITION_TARGET_TYPEMASK_YAW_IGNORE
     assert enums.NO_PLACE == 2**31 - 1
 
 

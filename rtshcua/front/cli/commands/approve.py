@@ -112,6 +112,8 @@ def _tell(draft: ApprovalDraft, step: int) -> str:
 def _other(planned: PlannedPath) -> str:
     if not planned.points:
         return "the planner finds none there"
+    if planned.levels:
+        return "it has the planner's places, but other heights or headings"
     apart = f"up to {prose.length(planned.apart)} from the mission's path"
     return f"the planner's path has {planned.points} points, is {prose.length(planned.length)} long, and lies {apart}"
 

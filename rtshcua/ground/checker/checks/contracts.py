@@ -22,7 +22,9 @@ from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.checker.types import DURATION, HEIGHT, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.ground.checker.types import DURATION, HEIGHT, LENGTH, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.ground.geometry.levels import CLOSED
+from rtshcua.ground.geometry.survey import DEFAULT_PATTERN
 from rtshcua.model.durability import BUFFERED, WORDS, WRITTEN
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.contract import TimingClass
@@ -98,6 +100,8 @@ def _complete(context: CheckContext, skill: SkillDecl) -> None:
 
 def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None:
     _parameter(context, skill, motion.altitude, HEIGHT)
+    _parameter(context, skill, motion.lowest, HEIGHT)
+    _parameter(context, skill, motion.every, LENGTH)
     _parameter(context, skill, motion.speed, SPEED)
     _parameter(context, skill, motion.time, DURATION)
     _parameter(context, skill, motion.target, ZONE if motion.kind == "cover" else POSITION)
@@ -117,6 +121,25 @@ def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
         else:
             for choice in argument.declaration.choices:
                 one_of(context, codes.BAD_MOTION, choice, PATTERNS, "survey pattern")
+    if motion.facing is not None:
+        _facing(context, skill, motion)
+
+
+def _facing(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None:
+    """Report an open path that faces inward: it has no middle."""
+    wanted = None if motion.pattern is None else motion.pattern.text
+    choices = [choice for each in skill.parameters if each.name.text == wanted for choice in each.choices]
+    pattern = next((choice for choice in choices if choice.text not in CLOSED), None)
+    if pattern is None and choices:
+        return
+    context.report.add(
+        codes.BAD_MOTION,
+        motion.span,
+        f"a path `facing inward` goes around something, and a `{DEFAULT_PATTERN if pattern is None else pattern.text}` "
+        "does not",
+        help="name a pattern: a choice among " + ", ".join(f"`{each}`" for each in CLOSED),
+        labels=[] if pattern is None else [(pattern.span, "this pattern is open")],
+    )
 
 
 def _parameter(context: CheckContext, skill: SkillDecl, name: Name | None, type: Type) -> None:

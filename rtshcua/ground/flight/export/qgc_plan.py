@@ -11,11 +11,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from rtshcua.diagnostics.excerpt import escaped
-from rtshcua.ground.flight.export.exported import DEGREES, METRES, SECONDS, FlightExport, number
+from rtshcua.ground.flight.export.exported import DEGREES, HEADING, METRES, SECONDS, FlightExport, number
 from rtshcua.ground.flight.track import home_of
 from rtshcua.mavlink import enums
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.mission import Invocation
+from rtshcua.model.flat.mission import ALONG, Invocation
 from rtshcua.model.flat.zone import unproject
 
 DATUM: Final = "above home; home itself above mean sea level"
@@ -83,8 +83,9 @@ def _items(export: FlightExport) -> Iterator[dict[str, Any]]:
             x, y, height, flying = 0, 0, 0, False
             continue
         if plan.kind in (MotionKind.FLY, MotionKind.COVER):
-            for x, y in zip(plan.path[::2], plan.path[1::2], strict=True):
-                yield _at(unproject(projection, x, y), height, WAYPOINT, 0, 0, 0)
+            headings = plan.headings or (ALONG,) * (len(plan.path) // 2)
+            for (x, y, height), heading in zip(plan.points(), headings, strict=True):
+                yield _at(unproject(projection, x, y), height, WAYPOINT, 0, 0, 0, heading=heading)
         elif plan.kind == MotionKind.CLIMB:
             command = WAYPOINT if flying else enums.MAV_CMD_NAV_TAKEOFF
             yield _at(unproject(projection, x, y), height, command, 0, 0, 0)
@@ -107,10 +108,12 @@ def _simple(command: int, *four: float) -> dict[str, Any]:
     return _item(command, _MISSION_FRAME, (*four, 0, 0, 0))
 
 
-def _at(place: tuple[int, int], above_home: int, command: int, *three: float) -> dict[str, Any]:
-    """An item at a place; its fourth parameter is the yaw, which is left to the vehicle (null means NaN)."""
-    height = number(above_home, METRES)
-    params = (*three, None, number(place[0], DEGREES), number(place[1], DEGREES), height)
+def _at(place: tuple[int, int], above_home: int, command: int, *three: float, heading: int = ALONG) -> dict[str, Any]:
+    """An item at a place; its fourth parameter is the yaw in degrees, which is left to the vehicle without a heading
+    (null means NaN).
+    """
+    height, yaw = number(above_home, METRES), None if heading == ALONG else number(heading, HEADING)
+    params = (*three, yaw, number(place[0], DEGREES), number(place[1], DEGREES), height)
     shown = {"AMSLAltAboveTerrain": None, "Altitude": height, "AltitudeMode": _RELATIVE}
     return shown | _item(command, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, params)
 

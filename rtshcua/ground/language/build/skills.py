@@ -57,7 +57,11 @@ def _clauses_of(reader: Reader, span: Span, condition: Condition, fitted: bool |
 FORMS: dict[str, Action] = {
     "climb_to": part("motion", node(MotionDecl, "altitude", kind="climb")),
     "fly_to": part("motion", node(MotionDecl, "target", "altitude", "speed", kind="fly")),
-    "cover_area": part("motion", node(MotionDecl, "target", "altitude", "pattern", "speed", kind="cover")),
+    "cover_area": part("motion", node(MotionDecl, "target", "altitude", "pattern", "facing", "speed", kind="cover")),
+    "cover_levels": part(
+        "motion",
+        node(MotionDecl, "target", "lowest", "altitude", "every", "pattern", "facing", "speed", kind="cover"),
+    ),
     "hold_for": part("motion", node(MotionDecl, "kind", "time")),
     "stay": part("motion", node(MotionDecl, "kind")),
     "timing_class": part("class"),

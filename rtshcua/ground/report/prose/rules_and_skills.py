@@ -84,6 +84,10 @@ def describe_motion(motion: MotionDecl | None) -> str:
             words = f"flies in a straight line to {target} at {altitude}"
         case "cover":
             words = f"flies a survey path over {target} at {altitude}"
+            if motion.lowest is not None:
+                words = f"flies a survey path over {target} at each height from {_given(motion.lowest)} to {altitude}"
+                words += ", evenly spaced"
+                words += "" if motion.every is None else f" and at most {_given(motion.every)} apart"
         case "home":
             words = "flies home and lands there"
         case "hold":
@@ -92,6 +96,8 @@ def describe_motion(motion: MotionDecl | None) -> str:
             words = "lands where it is"
     if motion.pattern is not None:
         words += f", in {_given(motion.pattern)}"
+    if motion.facing is not None:
+        words += f", with its nose {motion.facing}, to the middle of the path"
     if motion.speed is not None:
         words += f", with {_given(motion.speed)}"
     if motion.time is not None:

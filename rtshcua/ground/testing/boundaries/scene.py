@@ -103,10 +103,12 @@ def replanned(invocation: PreparedInvocation, arguments: tuple[int, ...]) -> Pre
         path = arguments[cell : cell + 2]
     altitude = plan.altitude if motion.altitude == -1 else arguments[motion.altitude]
     speed = plan.speed if motion.speed == -1 else arguments[motion.speed]
-    plan = replace(plan, path=path, altitude=altitude, speed=speed)
+    lowest = altitude if motion.lowest == -1 else arguments[motion.lowest]
+    heights = tuple(min(max(height, lowest), altitude) for height in plan.heights)
+    plan = replace(plan, path=path, altitude=altitude, speed=speed, heights=heights)
     planned: Invocation = replace(flat, arguments=arguments, plan=plan)
     flown = flown_at(motion, altitude, vehicle)
-    planner = Planner(plan.kind, path, flown, vehicle.position_error, near_home(vehicle))
+    planner = Planner(plan.kind, path, flown, vehicle.position_error, near_home(vehicle), heights)
     return changed(
         invocation,
         invocation=planned,

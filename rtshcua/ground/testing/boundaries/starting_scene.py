@@ -19,8 +19,8 @@ from rtshcua.ground.analysis.solve import Goal, Questions
 from rtshcua.ground.analysis.witness import plainest
 from rtshcua.ground.testing.boundaries.pivot import permitted, settled
 from rtshcua.ground.testing.boundaries.scene import Scene, SceneChanges, SceneVariable, Value, parts_of
-from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, MotionKind, SourceKind
-from rtshcua.model.flat.mission import Invocation, OnInadmissible, Plan
+from rtshcua.model.flat.contract import PLACE, QUANTITY, ZONE, Facing, MotionKind, SourceKind
+from rtshcua.model.flat.mission import ALONG, Invocation, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import Context, Now, State
 
@@ -171,6 +171,9 @@ def _sketch(
         path = HOME
     altitude = 0 if motion.altitude == -1 else arguments[motion.altitude]
     speed = 0 if motion.speed == -1 else arguments[motion.speed]
+    if motion.lowest != -1:
+        arguments[motion.lowest] = min(arguments[motion.lowest], altitude)
+    headings = (ALONG,) * (len(path) // 2) if motion.facing != Facing.ALONG else ()
     flat = Invocation(
         invocation_id=b"",
         step=0,
@@ -183,7 +186,7 @@ def _sketch(
         phases=1,
         on_inadmissible=int(OnInadmissible.ABORT),
         contract=contract,
-        plan=Plan(motion.kind, path, altitude, speed),
+        plan=Plan(motion.kind, path, altitude, speed, headings=headings),
         text="",
         file=0,
         start=0,

@@ -49,7 +49,16 @@ class Watched:
     def at(self, at_us: int, height: int, sinks: int = 0) -> None:
         self.hear("ESTIMATOR_STATUS", at_us, flags=KNOWN)
         self.hear(
-            "GLOBAL_POSITION_INT", at_us, lat=0, lon=0, alt=height, relative_alt=height, vx=0, vy=0, vz=sinks // 10
+            "GLOBAL_POSITION_INT",
+            at_us,
+            lat=0,
+            lon=0,
+            alt=height,
+            relative_alt=height,
+            vx=0,
+            vy=0,
+            vz=sinks // 10,
+            hdg=0,
         )
 
     def leans(self, at_us: int, tilt: float) -> None:

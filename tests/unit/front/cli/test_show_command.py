@@ -22,8 +22,8 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.front.cli.render.showing.policy import show_policy
-from rtshcua.model.flat.contract import CHOICE, Parameter
-from rtshcua.model.flat.mission import OnInadmissible
+from rtshcua.model.flat.contract import CHOICE, MotionKind, Parameter
+from rtshcua.model.flat.mission import OnInadmissible, Plan
 from rtshcua.model.flat.policy import LeftOut, Monitor, MonitorKind, Policy
 from rtshcua.model.flat.zone import CIRCLE, Zone
 from rtshcua.wire import key_file
@@ -293,6 +293,10 @@ def test_a_temporal_monitor(kind: int, window_us: int, text: str) -> None:
 
 def test_words_of_places_and_zones() -> None:
     assert prose.geographic(-473_977_400, 5) == "47.39774 S, 0.0000005 E"
+    levelled = Plan(MotionKind.COVER, (0, 0, 9_000, 0), 20_000, 0, (12_000, 20_000), (0, 9_000))
+    assert prose.plan(case.policy(), levelled).endswith(
+        "at 2 heights from 12 m to 20 m above home, facing inward, at the vehicle's own speed"
+    )
     assert prose.geographic(0, -1_800_000_000) == "0.0 N, 180.0 W"
     round_zone = Zone("z", CIRCLE, 0, 60_000, (0, 0, 80_000**2))
     assert prose.zone(case.policy(), round_zone).startswith("circle of 80 m around ")

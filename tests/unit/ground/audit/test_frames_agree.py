@@ -13,6 +13,7 @@ from rtshcua.ground.audit.frame_meaning import read_frame as read
 from rtshcua.mavlink.layouts import LAYOUTS
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.mission import ALONG
 from rtshcua.onboard.enforcement.allow_list import Frame as Shape
 from rtshcua.onboard.enforcement.allow_list import carries_out, read_frame
 from rtshcua.onboard.ports import Command
@@ -35,7 +36,10 @@ def nature_of(octets: bytes) -> FrameNature | None:
 
 
 #: values with a meaning in some field of some frame
-VALUES = (0, 1, -1, 2, 3, 4, 5, 6, 9, 12, 15.0, 17, 22, 21_196, 176, 178, 192, 400, float("nan"), float("inf"), 0x0DF8)
+VALUES = (
+    0, 1, -1, 2, 3, 4, 5, 6, 9, 12, 15.0, 17, 22, 21_196, 176, 178, 192, 400, float("nan"), float("inf"), 0x0DF8,
+    0x09F8, 1.5707963705062866, -1.5707963705062866,
+)  # fmt: skip
 POINTS = ((473_978_000, 85_456_000), (473_979_000, 85_457_000))
 
 
@@ -57,8 +61,14 @@ def test_auditor_and_boundary_accept_the_same_frames(kind: str, data: some.DataO
     altitude, speed = data.draw(some.sampled_from((15_000, 20_000))), data.draw(some.sampled_from((0, 4_000, 5_000)))
     path = data.draw(some.sampled_from(((), there, (*POINTS[0], *there))))
     geo = tuple(int(each) for each in path)
-    command = Command(1, "x", int(motion), geo, geo, altitude, speed)
-    target = MotionTarget(int(motion), frozenset(zip(geo[::2], geo[1::2], strict=True)), altitude, speed)
+    count = len(geo) // 2
+    heights = data.draw(some.sampled_from(((), (15_000, 20_000)[:count])))
+    headings = data.draw(some.sampled_from(((), (ALONG, 9_000)[:count], (9_000, 27_000)[:count])))
+    command = Command(1, "x", int(motion), geo, geo, altitude, speed, heights=heights, headings=headings)
+    points: dict[tuple[int, int], frozenset[tuple[int, int]]] = {}
+    for at, place in enumerate(zip(geo[::2], geo[1::2], strict=True)):
+        points[place] = points.get(place, frozenset()) | {(command.height_at(at), command.heading_at(at))}
+    target = MotionTarget(int(motion), points, altitude, speed)
     shape = frame._replace(fields=tuple(fields))
     mine = AuditedFrame(frame.system, frame.component, frame.message, tuple(fields))
     home = data.draw(some.sampled_from((None, HOME, HOME + 1_500)))
@@ -81,9 +91,7 @@ def test_reading_arbitrary_octets_does_not_raise(payload: bytes, message: int) -
             nature(frame)
             for autopilot in (PX4, ARDUPILOT):
                 for motion in MotionKind:
-                    is_part_of(
-                        frame, MotionTarget(int(motion), frozenset(), 10_000, 1_000), autopilot, HomeHeights(0, 0)
-                    )
+                    is_part_of(frame, MotionTarget(int(motion), {}, 10_000, 1_000), autopilot, HomeHeights(0, 0))
 
 
 @given(some.sampled_from(sorted(LAYOUTS)), some.binary(min_size=60, max_size=60))

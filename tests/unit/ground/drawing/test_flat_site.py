@@ -156,3 +156,13 @@ def test_stopping_distance(speed: int, stops: int) -> None:
     """From 12 m/s at most, 500 ms at this speed and then 2 m/s less in each second: v t + v^2 / 2 a."""
     assert FlightMargins(3_000, 12_000, 2_000, 500_000).stopping(speed) == stops
     assert FlightMargins(3_000, 12_000).stopping(speed) == 0
+
+
+def test_legs_of_a_path_with_heights_are_between_those_of_their_ends() -> None:
+    places, heights = ((0, 9_000), (9_000, 9_000), (9_000, 9_000)), (12_000, 12_000, 16_000)
+    levelled = PlannedStep(2, places, MotionKind.COVER, 16_000, heights=heights)
+    assert legs(PLAIN, UP, levelled)[1:] == [
+        ((0, 0, 20_000), (0, 9_000, 12_000), 12_000, 20_000),
+        ((0, 9_000, 12_000), (9_000, 9_000, 12_000), 12_000, 12_000),
+        ((9_000, 9_000, 12_000), (9_000, 9_000, 16_000), 12_000, 16_000),
+    ]

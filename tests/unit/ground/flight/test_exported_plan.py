@@ -13,7 +13,7 @@ from rtshcua.ground.flight.export.exported import FlightExport
 from rtshcua.ground.flight.export.qgc_plan import qgc_plan
 from rtshcua.mavlink import enums
 from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.mission import Plan
+from rtshcua.model.flat.mission import ALONG, Plan
 from virtual import case
 
 
@@ -68,6 +68,15 @@ def test_every_kind_of_motion(export: FlightExport) -> None:
     assert items[1]["params"] == [1, 3.0, -1, 0, 0, 0, 0]
     last = items[-1]["params"][4:6]
     assert last == items[-2]["params"][4:6] == items[-3]["params"][4:6]
+
+
+def test_each_point_has_its_own_height_and_yaw(export: FlightExport) -> None:
+    path = (0, 0, 5_000, 0, 5_000, 5_000)
+    cover = Plan(MotionKind.COVER, path, 20_000, 0, (12_000, 12_000, 20_000), (9_000, 17_950, ALONG))
+    plan, _ = made(with_steps(export, Plan(MotionKind.CLIMB, (), 10_000, 0), cover, Plan(MotionKind.LAND, (), 0, 0)))
+    items = [each for each in plan["mission"]["items"] if each["command"] == 16]
+    assert [each["Altitude"] for each in items] == [12, 12, 20]
+    assert [each["params"][3] for each in items] == [90, 179.5, None]
 
 
 def test_the_airspace_is_the_fence(export: FlightExport) -> None:

@@ -306,7 +306,7 @@ class _Flight:
         start = self._scenario.start
         asked: dict[str, object] = {
             "flavour": AutopilotKind(self._flavour), "seed": self._seed, "answers": Answers.RECORDED,
-            "estimate": Estimate.REAL,
+            "estimate": Estimate.REAL, "camera": self._scenario.has_camera, "gimbal": self._scenario.has_gimbal,
         }  # fmt: skip
         if start.battery is not None:
             asked["battery"] = start.battery

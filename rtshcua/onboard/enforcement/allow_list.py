@@ -84,7 +84,7 @@ def is_housekeeping(frame: Frame) -> bool:
 _GROUND_STATION: Final = 255
 
 
-#: the components that are cameras; an autopilot never obeys a frame for one of them as a command that moves it
+#: the components that are cameras
 CAMERAS: Final = range(enums.MAV_COMP_ID_CAMERA, enums.MAV_COMP_ID_CAMERA6 + 1)
 
 

@@ -48,6 +48,7 @@ from rtshcua.virtual.flight_record import (
     Reaction,
     ScenarioFlown,
     SentFrame,
+    TrueImage,
     TruthSample,
     Turn,
 )
@@ -616,6 +617,9 @@ class _Flight:
             left=left,
             fault=fault,
             notes=tuple(self._notes),
+            images=tuple(
+                TrueImage(each.utc_us, *each.globe(self._configs[-1].home)) for each in self._world.shots if each.stored
+            ),
         )
 
     # -------------------------------------------------------- documents

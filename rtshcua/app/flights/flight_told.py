@@ -127,7 +127,8 @@ def _images(flight: Flight, images: FlightImages) -> Iterator[ImageView]:
             where = flight.local(detail.latitude, detail.longitude)
         yield ImageView(
             each.seq, each.t_us, detail.camera, detail.index, detail.asked, detail.above_home_mm, where,
-            detail.yaw_cd, detail.pitch_cd, detail.attitude == "vehicle", detail.horizontal_mm,
+            None if detail.yaw_cd is None else detail.yaw_cd % 36_000, detail.pitch_cd, detail.attitude == "vehicle",
+            detail.horizontal_mm,
         )  # fmt: skip
 
 

@@ -7,6 +7,8 @@
 #define ROUNDING 2       /* mm, mm/s */
 #define NEAR 449         /* 1e-7 degree of latitude */
 #define YAW_ROUNDING 100 /* 1e-6 radian */
+#define CAMERA_CAPTURE_STATUS 262
+#define CAMERA_IMAGE_CAPTURED 263
 
 static const uint32_t parameters[] = {
     RT_COMMAND_LONG_PARAM1, RT_COMMAND_LONG_PARAM2, RT_COMMAND_LONG_PARAM3, RT_COMMAND_LONG_PARAM4,
@@ -51,6 +53,16 @@ bool rt_is_housekeeping(const rt_frame *frame) {
     default:
         return false;
     }
+}
+
+bool rt_asks_camera(const rt_frame *frame) {
+    if (frame->message != RT_MSG_COMMAND_LONG || !frame->has_target || frame->target_component < RT_MAV_COMP_ID_CAMERA ||
+        frame->target_component > RT_MAV_COMP_ID_CAMERA6)
+        return false;
+    if (rt_u16(frame, RT_COMMAND_LONG_COMMAND) != RT_MAV_CMD_REQUEST_MESSAGE || !are_zero(frame, 3))
+        return false;
+    uint32_t about = rt_u32(frame, RT_COMMAND_LONG_PARAM1);
+    return rt_is_whole(about, CAMERA_IMAGE_CAPTURED) || (rt_is_whole(about, CAMERA_CAPTURE_STATUS) && are_zero(frame, 2));
 }
 
 bool rt_is_greeting(const rt_frame *frame) {

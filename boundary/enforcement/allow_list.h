@@ -19,6 +19,8 @@ typedef struct {
 } rt_setting;
 
 bool rt_is_housekeeping(const rt_frame *frame);
+/* Whether it requests one report of a camera that is a component of its own. */
+bool rt_asks_camera(const rt_frame *frame);
 bool rt_is_greeting(const rt_frame *frame);
 /* `types` are the bits of the last received FENCE_TYPE, if `types_known`. */
 bool rt_is_of_fence(const rt_frame *frame, bool types_known, uint32_t types);

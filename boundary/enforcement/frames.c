@@ -125,8 +125,9 @@ static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t no
 static rt_refusal refuse_always(const rt_gate *gate, const rt_frame *frame) {
     if (frame->system != gate->system || frame->component != RT_MAV_COMP_ID_ONBOARD_COMPUTER)
         return "frame/not-ours";
-    if (frame->has_target &&
-        (frame->target_system != gate->system || frame->target_component != RT_MAV_COMP_ID_AUTOPILOT1))
+    if (frame->has_target && frame->target_system != gate->system)
+        return "frame/wrong-target";
+    if (frame->has_target && frame->target_component != RT_MAV_COMP_ID_AUTOPILOT1 && !rt_asks_camera(frame))
         return "frame/wrong-target";
     return rt_is_forced_arming(frame) ? "frame/forced-arming" : NULL;
 }
@@ -135,7 +136,7 @@ static rt_refusal refuse_always(const rt_gate *gate, const rt_frame *frame) {
 static rt_refusal refuse(rt_gate *gate, rt_bytes octets, int64_t now_us, bool *carries) {
     rt_frame frame;
     rt_setting setting;
-    /* 1. exactly one frame, from us, to the autopilot that was heard, and to nobody else */
+    /* 1. exactly one frame, from us, to the autopilot that was heard, or to a camera beside it, and to nobody else */
     if (!rt_read_frame(octets, &frame))
         return "frame/not-one-frame";
     if (gate->system == 0) /* a vehicle may wait for a first message; it only learns our ids */

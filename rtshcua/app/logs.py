@@ -26,6 +26,7 @@ _EXITS = {
     "decision": ExitCode.DECISION,
     "document": ExitCode.DECISION,
     "dispatch": ExitCode.DECISION,
+    "image": ExitCode.DECISION,
     "preparation": ExitCode.DECISION,
     "frames": ExitCode.DECISION,
     "anchor": ExitCode.ANCHOR,

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from rtshcua.campaign.scenario_source import incident_text
 from rtshcua.model import faults
-from rtshcua.model.faults import Direction, Fault, FlightMode, Voice
+from rtshcua.model.faults import CameraCounter, Direction, Fault, FlightMode, Voice
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.scenario import AfterStep, AtTime, Incident, Scenario, Start, When
@@ -55,6 +55,10 @@ GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
     (11, (faults.GpsLoss, faults.GpsJump, faults.GpsDrift, faults.GpsGlitch)),
     (11, (faults.WindStep, faults.BatteryLevel, faults.BatteryCell, faults.BatteryVoltage)),
     (7, (faults.Obstacle, faults.Pillar)),
+    (
+        4,
+        (faults.CameraLoss, faults.CameraSlow, faults.CameraFull, faults.CameraReboot, faults.GimbalStuck),
+    ),
     (
         12,
         (
@@ -299,6 +303,8 @@ def _value(chance: Random, kind: type[Fault], name: str, space: FaultSpace) -> o
         return chance.random() < 0.25
     if name == "says":
         return chance.choice(tuple(Voice))
+    if name == "counter":
+        return chance.choice(tuple(CameraCounter))
     if name == "mode":
         return chance.choice(_MODES)
     if name == "message":

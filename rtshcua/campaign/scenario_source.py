@@ -32,6 +32,7 @@ def _start(start: Start) -> str:
     if start.wind_mm_s is not None:
         speed, gust = (display(each, Dimension.SPEED) for each in (start.wind_mm_s, start.gust_mm_s))
         said.append(f"wind(speed = {speed}, from = {start.wind_from_deg} deg, gust = {gust})")
+    said += [f"{name}()" for name in ("camera", "gimbal") if getattr(start, name)]
     if start.utc_us is not None:
         moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=start.utc_us)
         said.append(f'at "{moment.isoformat().replace("+00:00", "Z")}"')

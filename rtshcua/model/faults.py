@@ -1,6 +1,7 @@
 """The faults that can be injected into a simulated flight.
 
-They concern the vehicle, its link, its surroundings, the pilot, the onboard computer, and senders of documents.
+They concern the vehicle, its camera and gimbal, its link, its surroundings, the pilot, the onboard computer, and
+senders of documents.
 
 `at_us` is the time since the start of the simulation; `for_us` None means permanently. The end of a field's name
 is its unit. Sources name a kind as in `KINDS`, with `_` for `-`, and a field by its name without the unit.
@@ -68,6 +69,12 @@ class AutopilotFault(Fault):
 
 class PilotFault(Fault):
     """An intervention by a pilot who does not use our link."""
+
+    __slots__ = ()
+
+
+class PayloadFault(Fault):
+    """A fault of the camera or the gimbal; without effect on a vehicle that has none."""
 
     __slots__ = ()
 
@@ -377,6 +384,55 @@ class Kill(PilotFault):
 
 
 @dataclass(frozen=True, slots=True)
+class CameraLoss(PayloadFault):
+    """The shutter does not open for this fraction of the pictures, in 1/10000."""
+
+    part: int
+    for_us: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSlow(PayloadFault):
+    """The camera takes this much longer to store and report a picture, and takes no other one meanwhile."""
+
+    delay_us: int
+    for_us: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CameraFull(PayloadFault):
+    """The camera's storage is full: no more pictures are stored."""
+
+    for_us: int | None = None
+
+
+class CameraCounter(StrEnum):
+    """What becomes of the index of images when the camera restarts."""
+
+    RESTARTS = "restarts"
+    """The next image has index 0."""
+    CONTINUES = "continues"
+    "The camera counts all images that it has ever stored."
+
+
+@dataclass(frozen=True, slots=True)
+class CameraReboot(PayloadFault):
+    """The camera restarts and is silent meanwhile. A picture that it has not stored is lost; stored ones are kept, but
+    are no longer reported on request.
+    """
+
+    for_us: int = 5_000_000
+    counter: CameraCounter = CameraCounter.RESTARTS
+
+
+@dataclass(frozen=True, slots=True)
+class GimbalStuck(PayloadFault):
+    """The gimbal's motors do not move; it acknowledges commands and reports its true attitude."""
+
+    for_us: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class RuntimeKilled(HostFault):
     """The process of the runtime dies, and is restarted after this time, as `run` does after a crash."""
 
@@ -488,6 +544,11 @@ KINDS: Mapping[str, type[Fault]] = {
     "stale": StaleSource,
     "stuck": MessageStuck,
     "mute": MessageSilence,
+    "camera-loss": CameraLoss,
+    "camera-slow": CameraSlow,
+    "camera-full": CameraFull,
+    "camera-reboot": CameraReboot,
+    "gimbal-stuck": GimbalStuck,
     "runtime-killed": RuntimeKilled,
     "boundary-killed": BoundaryKilled,
     "host-stall": HostStall,
@@ -530,9 +591,15 @@ WORDS: Mapping[str, tuple[str, ...]] = {
     "way": tuple(Direction),
     "held": ("yes", "no"),
     "says": tuple(Voice),
+    "counter": tuple(CameraCounter),
 }
 #: and the types of their values
-WORD_TYPES: Mapping[str, type[FlightMode | Direction | Voice]] = {"mode": FlightMode, "way": Direction, "says": Voice}
+WORD_TYPES: Mapping[str, type[FlightMode | Direction | Voice | CameraCounter]] = {
+    "mode": FlightMode,
+    "way": Direction,
+    "says": Voice,
+    "counter": CameraCounter,
+}
 #: fields that are a plain number
 COUNTS = frozenset({"copies", "shuffle"})
 #: fields that may be negative: south and west, down, and back in time

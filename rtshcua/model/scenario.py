@@ -6,7 +6,7 @@ in us.
 
 from dataclasses import dataclass
 
-from rtshcua.model.faults import Fault
+from rtshcua.model.faults import Fault, GimbalStuck, PayloadFault
 from rtshcua.model.flat.code import Clause
 
 #: the available autopilots
@@ -77,6 +77,8 @@ class Start:
     wind_from_deg: int = 0
     gust_mm_s: int = 0
     utc_us: int | None = None
+    camera: bool = False
+    gimbal: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,3 +155,13 @@ class Scenario:
     start: Start
     incidents: tuple[Incident, ...]
     expectations: tuple[ScenarioExpectation, ...]
+
+    @property
+    def has_camera(self) -> bool:
+        """Whether its vehicle has a camera: if it starts with one, or one fails."""
+        return self.start.camera or any(isinstance(each.fault, PayloadFault) for each in self.incidents)
+
+    @property
+    def has_gimbal(self) -> bool:
+        """The same of a gimbal."""
+        return self.start.gimbal or any(isinstance(each.fault, GimbalStuck) for each in self.incidents)

@@ -181,6 +181,27 @@ class StatusText(Event, frozen=True):
     text: str
 
 
+class ImageReported(Event, frozen=True):
+    """A camera reported a picture for the first time. `detail` is its record (`evidence.images`), untrusted. `camera`
+    is the MAVLink component, `index` None for a picture that failed.
+    """
+
+    camera: int
+    index: int | None
+    detail: str
+
+
+class ImagesExpected(Event, frozen=True):
+    """The indices from `first` to `last` that a camera's images of a series should have: those that are not recorded
+    are missing.
+    """
+
+    camera: int
+    series: int
+    first: int
+    last: int
+
+
 class Presented(Event, frozen=True):
     """Somebody presented a signed document, not verified yet: an approval, a recall, a replacement, a cancellation.
 

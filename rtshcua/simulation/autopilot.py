@@ -18,11 +18,14 @@ from rtshcua.mavlink.layouts import TEXT_OCTETS
 from rtshcua.model.faults import FlightMode
 from rtshcua.simulation.answers import Lanes
 from rtshcua.simulation.battery import Battery
+from rtshcua.simulation.camera import Shot, SimulatedCamera
 from rtshcua.simulation.command import VehicleCommand
 from rtshcua.simulation.config import Answers, Boot, Equipment, Estimate, Purpose, SimulationConfig
 from rtshcua.simulation.failsafe import FailsafeRules, Failsafes
 from rtshcua.simulation.fence import Breach, FenceRules, FenceWatch
+from rtshcua.simulation.gimbal import SimulatedGimbal
 from rtshcua.simulation.handling import Handling
+from rtshcua.simulation.kinematics import Body
 from rtshcua.simulation.mission import MissionProgress, MissionRules
 from rtshcua.simulation.mission_protocol import MISSION, PlanItem, Plans, Transfer, TransferRules
 from rtshcua.simulation.modes import NEEDS_POSITION, ModeTable
@@ -108,6 +111,8 @@ class Flavour(ABC):
     """GPS_RAW_INT.fix_type of a good fix."""
     coast_s: float
     """How long the estimator continues without a fix."""
+    speaks_for_payload: bool
+    """Whether it triggers the camera and moves the gimbal itself, and answers for them and for any other component."""
     texts_need_ground_station: bool
     """Whether STATUSTEXT is sent only after a ground station's heartbeat."""
     check_text: str
@@ -260,6 +265,8 @@ class Autopilot:
             self.parameters.assign("MAV_SIGN_CFG", 1)  # the owner's parameters below may override it
         for name, value in config.parameters:
             self.parameters.own(name, value)
+        self.gimbal = SimulatedGimbal() if config.gimbal else None
+        self.camera = self._camera(config) if config.camera else None
         self.reports = Reports({number: partial(build, self) for number, build in flavour.builders.items()}, self._time)
         self.signing = VehicleSigning(config.signing_key, config.utc_us, config.speed, flavour.key_ahead_us)
         self.plans = Plans()
@@ -267,6 +274,23 @@ class Autopilot:
         if self._home_item is not None:
             self.plans.replace(MISSION, (self._home_item,))
         self._start()
+
+    def _camera(self, config: SimulationConfig) -> SimulatedCamera:
+        chance, triggered = Random(f"{config.seed} camera"), self.flavour.speaks_for_payload
+        camera = SimulatedCamera(
+            chance, self._body, self._where, self.gimbal, config.utc_us, triggered=triggered
+        )  # fmt: skip
+        if triggered:
+            camera.report = self._tell_picture
+        return camera
+
+    def _tell_picture(self, shot: Shot) -> None:
+        """Report the shutter's feedback; there is none of a picture that was not taken."""
+        if shot.stored and not self.off_us:
+            self.send(self.flavour.builders[mavlink.MAVLINK_MSG_ID_CAMERA_FEEDBACK](self))
+
+    def _body(self) -> Body:
+        return self.vehicle.body
 
     def _start(self) -> None:
         """Initialise the state that each restart resets. Stored state and the world are in `__init__`."""
@@ -350,6 +374,18 @@ class Autopilot:
         self.now_us = 0
         self.battery_told_us.clear()
         self.outbox.clear()
+        if self.camera is not None and self.flavour.speaks_for_payload:
+            self.camera.stop()
+            self.camera.forget()
+
+    def step_payload(self, now_us: int) -> None:
+        """Advance the gimbal and the camera to a time of the simulation. They run on while the autopilot's loop is
+        halted.
+        """
+        if self.gimbal is not None:
+            self.gimbal.step(_TICK_S, self.vehicle.body)
+        if self.camera is not None:
+            self.camera.step(now_us)
 
     def _drain(self, load: float) -> None:
         for purpose, battery in self.batteries:

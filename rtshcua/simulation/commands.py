@@ -9,11 +9,11 @@ from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import VehicleCommand, whole
 from rtshcua.simulation.telemetry import AVAILABLE_MODES, available_modes
 
-ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
-TEMPORARILY_REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
-DENIED = mavlink.MAV_RESULT_DENIED
-UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
-FAILED = mavlink.MAV_RESULT_FAILED
+ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
+TEMPORARILY_REJECTED: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+DENIED: int = mavlink.MAV_RESULT_DENIED
+UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
+FAILED: int = mavlink.MAV_RESULT_FAILED
 
 FORCE = 21196
 """Parameter 2 of COMPONENT_ARM_DISARM that overrides every check."""

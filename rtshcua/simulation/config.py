@@ -124,6 +124,10 @@ class SimulationConfig:
     """Parameters that the owner has set: names that the flavour has, and values."""
     extras: frozenset[Equipment] = EQUIPPED
     """Equipment beside GPS, barometer and battery."""
+    camera: bool = False
+    """Whether it has a camera: on PX4 a component of its own, on ArduCopter one that the autopilot triggers."""
+    gimbal: bool = False
+    """Whether it has a gimbal, which carries the camera. A camera without one looks down."""
     radio_us: int = 1_000_000
     """The interval between two reports of the radio; a SiK radio reports once a second."""
     faults: tuple[Fault, ...] = ()

@@ -23,6 +23,7 @@ FENCE_PREFIXES = ("FENCE_", "GF_")
 """Name prefixes of the parameters that change the fence."""
 _NEVER = 1 << 62
 
+_COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 _COMMAND_ACK = maker(mavlink.MAVLink_command_ack_message)
 
 
@@ -37,6 +38,7 @@ class Face:
         self._system = system
         self._codec = Codec(system, COMPONENT)
         self._radio = Codec(RADIO_SYSTEM, RADIO)
+        self._others: set[int] = set()  # the components of this system that were heard
         self.radio_due_us = 0 if Equipment.RADIO in autopilot.extras else _NEVER
         """When the radio sends next, in simulation time: the radio runs on while the autopilot's loop is halted."""
 
@@ -50,8 +52,15 @@ class Face:
         return [] if self._autopilot.off_us else self._codec.parse(datagram)
 
     def lets_in(self, received: ReceivedFrame) -> bool:
-        """Return whether a frame is to be obeyed."""
-        return received.name in _HANDLERS and self._is_for_me(received.message) and self._is_trusted(received)
+        """Return whether a trusted frame is for the autopilot."""
+        if received.system == self._system:
+            self._others.add(received.component)
+        return received.name in _HANDLERS and self._is_for_me(received)
+
+    def trusts(self, received: ReceivedFrame) -> bool:
+        """Return whether a frame may be obeyed: it is signed, or need not be. To be asked once for each frame."""
+        a = self._autopilot
+        return a.signing.accept(received, a.now_us) or a.flavour.obeys_unsigned(a, received.name)
 
     def obey(self, received: ReceivedFrame) -> list[bytes]:
         """Obey an accepted frame and return the answering frames. Never raises."""
@@ -85,14 +94,18 @@ class Face:
         self.radio_due_us = now_us + self._radio_us
         return self._radio.pack(radio_status(self._autopilot))
 
-    def _is_for_me(self, message: Message) -> bool:
-        system = getattr(message, "target_system", 0)
+    def _is_for_me(self, received: ReceivedFrame) -> bool:
+        """Return whether a frame is addressed to the autopilot. ArduCopter obeys commands to components that it has not
+        heard (recorded: 100 and 154); it would pass them on to others.
+        """
+        message = received.message
+        if getattr(message, "target_system", 0) not in (0, self._system):
+            return False
         component = getattr(message, "target_component", 0)
-        return system in (0, self._system) and component in (0, COMPONENT)
-
-    def _is_trusted(self, received: ReceivedFrame) -> bool:
-        a = self._autopilot
-        return a.signing.accept(received, a.now_us) or a.flavour.obeys_unsigned(a, received.name)
+        if component in (0, COMPONENT):
+            return True
+        takes = self._autopilot.flavour.speaks_for_payload and received.name in _COMMANDS
+        return takes and component not in self._others
 
     def _collect(self) -> list[bytes]:
         a, outbox = self._autopilot, self._autopilot.outbox

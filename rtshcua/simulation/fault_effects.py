@@ -1,5 +1,5 @@
-"""Apply faults to a simulation at their times, including the pilot's interventions by switches, sticks or another
-ground station.
+"""Apply faults to a simulation at their times, including those of its camera, and the pilot's interventions by
+switches, sticks or another ground station.
 """
 
 from collections.abc import Callable, Iterator
@@ -110,6 +110,8 @@ def effects(fault: Fault, on: Affected) -> Iterator[Effect]:
             yield from _by_pilot(fault, a)
         case faults.ReceiverFault():
             yield from _on_receiver(fault, a)
+        case faults.PayloadFault():
+            yield from _on_payload(fault, a)
         case faults.Obstacle(at_us, distance_mm, for_us):
             see = a.surroundings.see
             yield from _for(at_us, for_us, partial(see, distance_mm / 1000), partial(see, None))
@@ -144,6 +146,27 @@ def _on_receiver(fault: faults.ReceiverFault, a: Autopilot) -> Iterator[Effect]:
             yield at_us, partial(sensors.jump, north_mm / 1000, east_mm / 1000)
         case faults.GpsDrift(at_us, north_mm_s, east_mm_s, for_us):
             yield from _while((sensors,), "stray", (north_mm_s / 1000, east_mm_s / 1000), (0.0, 0.0), at_us, for_us)
+        case _:
+            raise _unknown(fault)
+
+
+def _on_payload(fault: faults.PayloadFault, a: Autopilot) -> Iterator[Effect]:
+    """Yield effects on the camera and the gimbal, none where there is none."""
+    camera, gimbal = a.camera, a.gimbal
+    cameras = () if camera is None else (camera,)
+    match fault:
+        case faults.CameraLoss(at_us, part, for_us):
+            yield from _while(cameras, "loss", part, 0, at_us, for_us)
+        case faults.CameraSlow(at_us, delay_us, for_us):
+            yield from _while(cameras, "slow_us", delay_us, 0, at_us, for_us)
+        case faults.CameraFull(at_us, for_us):
+            yield from _while(cameras, "full", True, False, at_us, for_us)
+        case faults.CameraReboot(at_us, for_us, counter):
+            if camera is not None:
+                yield at_us, partial(camera.restart, counter)
+                yield at_us + for_us, camera.started
+        case faults.GimbalStuck(at_us, for_us):
+            yield from _while(() if gimbal is None else (gimbal,), "stuck", True, False, at_us, for_us)
         case _:
             raise _unknown(fault)
 

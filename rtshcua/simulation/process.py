@@ -81,6 +81,8 @@ def parser() -> argparse.ArgumentParser:
     add("--boot", choices=list(Boot), default=Boot.FAST, help="boot time: one second, or as recorded")
     add("--stock", action="store_true", help="GPS, barometer and battery only")
     add("--extra", choices=list(Equipment), action="append", help="equipment instead of the default; repeatable")
+    add("--camera", action="store_true", help="a camera: on PX4 component 100, on ArduCopter the autopilot's own")
+    add("--gimbal", action="store_true", help="a gimbal that carries the camera: on PX4 component 154")
     add("--signing-key", type=_key, metavar="FILE", help="the link's signing key: 32 octets, raw or hexadecimal")
     add("--parameter", type=_parameter, action="append", default=[], metavar="NAME=VALUE", help="set a parameter")
     add("--usb", action="store_true", help="the vehicle treats the link as USB")
@@ -116,6 +118,8 @@ def config_of(options: argparse.Namespace, utc_us: int = 0) -> SimulationConfig:
         else EQUIPPED
         if options.extra is None
         else frozenset(map(Equipment, options.extra)),
+        camera=options.camera,
+        gimbal=options.gimbal,
         parameters=tuple(options.parameter),
         faults=tuple(options.fault),
         signing_key=options.signing_key,

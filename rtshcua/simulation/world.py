@@ -4,7 +4,7 @@ Time always advances in ticks of 20 ms, so that the same configuration and the s
 the same bytes.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from heapq import heappop, heappush
 from itertools import count
 from math import degrees, hypot
@@ -16,6 +16,8 @@ from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.simulation.answers import Inbox
 from rtshcua.simulation.ardupilot.flavour import ArduCopter
 from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour, Taker
+from rtshcua.simulation.camera import Shot
+from rtshcua.simulation.components import components_of
 from rtshcua.simulation.config import Answers, AutopilotKind, SimulationConfig
 from rtshcua.simulation.face import Face
 from rtshcua.simulation.fault_effects import Affected, effects
@@ -60,6 +62,8 @@ class Simulation:
         flavour, recorded = FLAVOURS[config.flavour], config.answers is Answers.RECORDED
         self._autopilot = Autopilot(flavour, config)
         self._face = Face(self._autopilot, config.system, config.radio_us)
+        self._components = components_of(self._autopilot, config.system)
+        self._has_payload = config.camera or config.gimbal
         self._system = config.system
         self._up = FaultyLink(Random(f"{config.seed} uplink"))
         self._down = FaultyLink(Random(f"{config.seed} downlink"))
@@ -119,6 +123,12 @@ class Simulation:
         for at_us, effect in effects(fault, on):
             heappush(self._events, (at_us, next(self._order), effect))
 
+    @property
+    def shots(self) -> Sequence[Shot]:
+        """Every release of the camera's shutter so far, as it truly was."""
+        camera = self._autopilot.camera
+        return () if camera is None else tuple(camera.shots)
+
     def truth(self) -> Truth:
         """Return the true state as of the last tick."""
         vehicle = self._autopilot.vehicle
@@ -162,6 +172,12 @@ class Simulation:
             autopilot.tick()
             if autopilot.outbox or autopilot.now_us >= autopilot.streams.next_us:
                 down.send(face.due(), at_us)
+        if self._has_payload:
+            autopilot.step_payload(at_us)
+            for component in self._components:
+                component.due(at_us)
+                if not self._halted and not autopilot.off_us:
+                    down.send(component.taken(), at_us)
         if autopilot.taker is not None and self._taken_over_us is None:
             self._taken_over_us = at_us
         if at_us >= face.radio_due_us:
@@ -188,12 +204,24 @@ class Simulation:
             for received in self._face.parse(datagram):
                 if self.heard is not None:
                     self.heard(now_us, received.frame)
-                if not self._face.lets_in(received):
+                trusted = self._face.trusts(received)
+                if self._components and trusted:
+                    self._pass_on(received, now_us)
+                if not trusted or not self._face.lets_in(received):
                     continue
                 if inbox is None:
                     self._answer(received, now_us)
                 else:
                     inbox.put(received, now_us)
+
+    def _pass_on(self, received: ReceivedFrame, now_us: int) -> None:
+        """Pass a command to the components behind the autopilot's link."""
+        for component in self._components:
+            if component.is_named(received):
+                if self.obeyed is not None:
+                    self.obeyed(now_us, received.frame)
+                component.obey(received)
+                self._down.send(component.taken(), now_us)
 
     def _obey(self, inbox: Inbox, until_us: int) -> None:
         """Obey the queued frames that are due by `until_us`."""

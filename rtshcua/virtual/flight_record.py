@@ -71,6 +71,16 @@ class HeardReadings(NamedTuple):
     values: tuple[tuple[int, int | None], ...]
 
 
+class TrueImage(NamedTuple):
+    """An image that the simulated camera stored: its time by the camera's clock, and the place that the autopilot
+    believed to be at then (1e-7 degree), which the camera writes into its report.
+    """
+
+    utc_us: int
+    latitude: int
+    longitude: int
+
+
 class Turn(NamedTuple):
     """A turn of the loop: its time, and the readings that it received, in order."""
 
@@ -133,6 +143,8 @@ class ScenarioFlown:
     fault: str | None
     """The exception or time-out of the runtime; None: none."""
     notes: tuple[str, ...] = ()
+    images: tuple[TrueImage, ...] = ()
+    """All images that were stored."""
 
     @property
     def ending(self) -> str | None:

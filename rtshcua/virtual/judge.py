@@ -29,6 +29,7 @@ from itertools import pairwise
 from math import cos, hypot, inf, radians
 from typing import Any, Final, NamedTuple
 
+import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from rtshcua.evidence.report import LogVerdict
@@ -88,7 +89,7 @@ def judge(flown: ScenarioFlown) -> Judgement:
     end, ended_us = _end(flown)
     found = [
         *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
-        *_unlogged(flown, motion), *_faults(flown), *RuntimeChecks(flown, motion).failures(),
+        *_unlogged(flown, motion), *_faults(flown), *RuntimeChecks(flown, motion).failures(), *_images(flown),
     ]  # fmt: skip
     judged = [each if each.cause is not None else excuses.judged(each) for each in found]
     margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)
@@ -525,6 +526,23 @@ def _logs(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
         yield JudgedFailure(
             slug, at_us, f"record {report.failure.record}: {report.failure.slug}: {report.failure.text}"
         )
+
+
+def _images(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
+    """Yield recorded images that the camera did not store, or not with that place."""
+    stored = {each.utc_us: each for each in flown.images}
+    for life in flown.lives:
+        for record in records_of(life):
+            if record["type"] != "effect" or record["event"] != "image":
+                continue
+            told, at_us = msgspec.json.decode(record["detail"]), record["at_us"] - flown.start_us
+            if told["index"] is None:
+                continue
+            true = stored.get(told["utc_us"])
+            if true is None:
+                yield JudgedFailure("untrue", at_us, f"image {told['index']} was recorded and never stored")
+            elif (told["latitude"], told["longitude"]) != (true.latitude, true.longitude):
+                yield JudgedFailure("untrue", at_us, f"image {told['index']} was recorded with another place")
 
 
 class _Sent(NamedTuple):

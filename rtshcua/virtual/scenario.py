@@ -48,6 +48,7 @@ from rtshcua.virtual.flight_record import (
     Reaction,
     ScenarioFlown,
     SentFrame,
+    TrueImage,
     TruthSample,
     Turn,
 )
@@ -306,7 +307,7 @@ class _Flight:
         start = self._scenario.start
         asked: dict[str, object] = {
             "flavour": AutopilotKind(self._flavour), "seed": self._seed, "answers": Answers.RECORDED,
-            "estimate": Estimate.REAL,
+            "estimate": Estimate.REAL, "camera": self._scenario.has_camera, "gimbal": self._scenario.has_gimbal,
         }  # fmt: skip
         if start.battery is not None:
             asked["battery"] = start.battery
@@ -616,6 +617,9 @@ class _Flight:
             left=left,
             fault=fault,
             notes=tuple(self._notes),
+            images=tuple(
+                TrueImage(each.utc_us, *each.globe(self._configs[-1].home)) for each in self._world.shots if each.stored
+            ),
         )
 
     # -------------------------------------------------------- documents

@@ -77,8 +77,9 @@ def pack(message: Any, component: int = OURS, system: int = SYSTEM) -> bytes:
     return Codec(system, component).pack(message)
 
 
-def long(number: int, *parameters: float) -> Any:
-    return m.MAVLink_command_long_message(SYSTEM, 1, number, 0, *[*parameters, *[0.0] * (7 - len(parameters))])
+def long(number: int, *parameters: float, component: int = 1) -> Any:
+    padded = [*parameters, *[0.0] * (7 - len(parameters))]
+    return m.MAVLink_command_long_message(SYSTEM, component, number, 0, *padded)
 
 
 def drawn_command(random: Random, home: Projection) -> Command:
@@ -115,6 +116,10 @@ def drawn_frame(random: Random, of: Command) -> bytes:
             long(22, 0, 0, 0, 0, 0, odd, height),
             long(178, 1, speed, -1),
             long(random.choice((401, 511, 512, 246, 185)), random.choice((0, odd))),
+            long(
+                random.choice((512, 512, 511)), random.choice((262, 263, 263, 264, 262.5)), random.choice((0, 3, odd)),
+                random.choice((0, 0, odd)), component=random.choice((99, 100, 103, 105, 106, 0)),
+            ),
             m.MAVLink_command_int_message(
                 SYSTEM, 1, random.choice((0, 0, 0, 3)), 192, 0, 0, random.choice((speed, -1.0)), 1,
                 random.choice((0, odd)), random.choice((yaw, yaw, yaw, nan, 0)), x, y, random.choice((sea, sea, nan)),

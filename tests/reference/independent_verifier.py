@@ -15,6 +15,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from reference.independent_boundary import Boundary, Disputed
+from reference.independent_images import Contradicted, Images
 from reference.independent_note import Broken, claimed, cosigned, ident, notes_of, read_note
 from reference.independent_records import LONGEST, SIGNED, Malformed, canonical, parse, unbase64
 from reference.independent_root import Root, Untrusted, check_bundle, holds, key_id, open_root
@@ -25,8 +26,8 @@ _ANCHORED, _STALLED = "anchored", "stalled"
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on a log: `closed`, `incomplete`, `broken`, `untrusted`, `anchor` or `boundary`; `line` is the first
-    bad one. `gaps` are the lines after a gap, each with its duration in us.
+    """`closed`, `incomplete`, `broken`, `untrusted`, `anchor`, `boundary` or `images`; `line` is the
+    first bad one. `gaps` are the lines after a gap, each with its duration in us.
     """
 
     kind: str
@@ -112,6 +113,8 @@ class Walk:
         self.base: tuple[int, int] = (0, 0)
         self.boundary: Boundary | None = None
         self.disputed: tuple[str, int] | None = None
+        self.images = Images()
+        self.contradicted: tuple[str, int] | None = None
 
     def verdict(self, rest: bytes, anchors: Iterable[bytes] = (), witnesses: int | None = None) -> Verdict:
         """The verdict on the log if these octets are its rest."""
@@ -131,6 +134,8 @@ class Walk:
             return Verdict("anchor", str(error), None, self.seq)
         if self.disputed is not None:
             return Verdict("boundary", *self.disputed, self.seq, anchored)
+        if self.contradicted is not None:
+            return Verdict("images", *self.contradicted, self.seq, anchored)
         if self.boundary is not None and self.boundary.lost:
             kind = "incomplete"
         return Verdict(kind, "", None, self.seq, anchored, tuple(self.gaps))
@@ -157,6 +162,11 @@ class Walk:
         else:
             self._epoch(record, silent_us)
         self._attested(record)
+        if self.contradicted is None:
+            try:
+                self.images.line(record)
+            except Contradicted as error:
+                self.contradicted = str(error), self.seq
         if record.get("event") == _ANCHORED:
             self.notes.append(record["detail"])
         self.prev = leaf(line)

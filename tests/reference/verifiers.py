@@ -20,7 +20,7 @@ ROOT_KEY = case.KEYS[Duty.ROOT].public
 WORDS = {
     LogVerdict.VERIFIED: ("closed",),
     LogVerdict.INCOMPLETE: ("incomplete",),
-    LogVerdict.FAILED: ("broken", "untrusted", "anchor", "boundary"),
+    LogVerdict.FAILED: ("broken", "untrusted", "anchor", "boundary", "images"),
 }
 #: findings outside docs/log-format.md: the meaning of records and bundle
 OF_MEANING = (
@@ -76,12 +76,14 @@ def agree(data: bytes, audit: Audit, pinned: bytes = ROOT_KEY) -> None:
         assert word in ("closed", "incomplete", "untrusted"), (word, report.failure)
     elif slug.startswith("boundary/"):
         assert word == "boundary", (word, report.failure)
+    elif slug.startswith("image/"):
+        assert word == "images", (word, report.failure)
     elif slug.startswith(OF_MEANING):
-        assert word in ("closed", "incomplete"), (word, report.failure)
+        assert word in ("closed", "incomplete", "images"), (word, report.failure)
     else:
         assert word in WORDS[report.verdict], (word, report.failure)
     if quick_accepts(data, pinned):
-        unasked = slug.startswith((*OF_MEANING, *OF_FORM_OF_BUNDLES, *OF_FORM, "boundary/"))
+        unasked = slug.startswith((*OF_MEANING, *OF_FORM_OF_BUNDLES, *OF_FORM, "boundary/", "image/"))
         assert report.verdict is LogVerdict.VERIFIED or unasked or short, report.failure
     else:
         assert report.verdict is not LogVerdict.VERIFIED

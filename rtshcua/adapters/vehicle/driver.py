@@ -2,7 +2,7 @@
 serves real and virtual time.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 from msgspec.structs import replace
@@ -11,6 +11,7 @@ from rtshcua.adapters.vehicle import messages, observed, others, preflight
 from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.drain import Consumption
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
+from rtshcua.adapters.vehicle.images import OF_AUTOPILOT, OF_CAMERA, ImageObserver
 from rtshcua.adapters.vehicle.link import (
     NO_VEHICLE,
     SILENT,
@@ -55,6 +56,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.onboard import ports
+from rtshcua.onboard.enforcement.allow_list import CAMERAS
 from rtshcua.onboard.enforcement.frames import OURS, Gate
 from rtshcua.onboard.left import Left
 from rtshcua.onboard.ports import Command, Event, StatusText
@@ -153,6 +155,8 @@ class Driver:
         self.link = VehicleLink(frames, verifier, system)
         self._gate_may_be_lost = frames.may_be_lost
         self.source = SourceTime()
+        #: the images that cameras report
+        self.images = ImageObserver(slack)
         #: the last observed state of the vehicle
         self.seen = ObservedVehicle()
         self._strangers: set[str] = set()  # notes about other senders under the vehicle's ids
@@ -365,6 +369,8 @@ class Driver:
             send.append(messages.request(self.system, "SYSTEM_TIME"))
         if now_us >= self.stream_requests.due_us:
             send += self.stream_requests.due(self.system, now_us)
+        triggers = self.flavour is ARDUPILOT
+        send += self._ask_images(self.images.due(self.system, now_us, triggers=triggers))
         if self._timed and not self._was_ready:
             send += self._ask_once(now_us)
         if self.asks_first is not None:
@@ -418,6 +424,8 @@ class Driver:
         self._unsent = command.token
         events: list[Event] = []
         send: list[Message] = []
+        if command.kind in (MotionKind.HOME, MotionKind.LAND):  # while it can still go back for what is missing
+            events += self.images.expected_images(now_us)
         self._advance(now_us, send, events)
         return events, self._pack(send, now_us, events)
 
@@ -548,6 +556,8 @@ class Driver:
         if source.stepped:
             seen.made_us.clear()
             self._crash.forget()
+        if name in (OF_AUTOPILOT if component == AUTOPILOT else OF_CAMERA if component in CAMERAS else ()):
+            self._take_image(frame, now_us, events)
         if component == AUTOPILOT:
             seen.count(source.place)
             self._spoken.add(name)
@@ -566,6 +576,18 @@ class Driver:
             return False
         self._tell(name, message)
         return name in self._heeded and self._update(name, message, at_us, now_us, events, send)
+
+    def _take_image(self, frame: ReceivedFrame, now_us: int, events: list[Event]) -> None:
+        """Take in a message of a camera, or of the autopilot for one."""
+        if frame.name != "COMMAND_ACK" or self._is_for_us(frame.message):
+            home_amsl = self.seen.home_amsl
+            events += self.images.take(frame.name, frame.message, frame.component, now_us, home_amsl)
+
+    def _ask_images(self, questions: Iterable[Message]) -> list[Message]:
+        """Requests about images; the autopilot's answers to them are counted."""
+        send = list(questions)
+        self._aids.query.asked += sum(each.target_component == AUTOPILOT for each in send)
+        return send
 
     def _update(
         self, name: str, message: Message, at_us: int | None, now_us: int, events: list[Event], send: list[Message]
@@ -602,6 +624,8 @@ class Driver:
         if air != was:
             self._was_air = air
             events.append(ports.AirState(now_us, *air))
+            if was is not None and was[1] and not seen.airborne:
+                events += self.images.expected_images(now_us)
 
     @property
     def _asks(self) -> bool:
@@ -736,7 +760,8 @@ class Driver:
             send += self._ask(now_us)
 
     def _tell_notes(self, now_us: int, events: list[Event]) -> None:
-        for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes, self._telemetry.notes):
+        images = self.images.notes
+        for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes, self._telemetry.notes, images):
             if notes:
                 events += [ports.Noted(now_us, text) for text in notes]
                 notes.clear()

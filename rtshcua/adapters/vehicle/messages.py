@@ -130,6 +130,12 @@ def request(system: int, message: str) -> Message:
     return command(system, enums.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
 
 
+def request_of(system: int, component: int, message: str, parameter: int = 0) -> Message:
+    """REQUEST_MESSAGE to a component, with parameter 2: the index of an image."""
+    padded = (number_of(message) or 0, parameter, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return _COMMAND.build(*padded, REQUEST_MESSAGE, system, component, 0)  # in wire order
+
+
 def time_sync(now_ns: int) -> Message:
     """TIMESYNC with our monotonic time, which is returned together with the vehicle's."""
     return dialect.MAVLink_timesync_message(0, now_ns)

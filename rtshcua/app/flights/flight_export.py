@@ -1,10 +1,12 @@
 """The service `export`: a flight as a file for other programs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from rtshcua import __version__
+from rtshcua.adapters import exiftool
+from rtshcua.adapters.exiftool import ExifToolError
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, TELEMETRY
@@ -18,31 +20,42 @@ from rtshcua.app.telling.record_prose import Names
 from rtshcua.app.verify_log import VerifyRequest, verify_log
 from rtshcua.app.wording import many
 from rtshcua.decision.prepare import prepare, prepare_mission
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, KEY, PROOF, SOURCE, SPECIFICATION
 from rtshcua.diagnostics.kinds import LOG as FLIGHT_LOG
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import listed, nearest
-from rtshcua.evidence.log_writer import BOUNDARY
+from rtshcua.evidence.log_writer import BOUNDARY, origin_of
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import DecisionRecord, Effect, Genesis
 from rtshcua.evidence.report import LogVerdict
-from rtshcua.ground.flight.export import CSV, FORMATS, GEOJSON, GPX, KML, MCAP, PLAN, TLOG
+from rtshcua.ground.flight.export import CSV, FORMATS, GEOJSON, GEOTAG, GPX, KML, MCAP, PLAN, SUFFIXES, TLOG
 from rtshcua.ground.flight.export.exported import ExportedRecord, FlightExport, with_usable_track
 from rtshcua.ground.flight.flown import Flight, FlightTelemetry
+from rtshcua.ground.flight.images import FlightImage, FlightImages, NamedImage, images_of, named
 from rtshcua.ground.flight.track import home_of
 from rtshcua.wire.request import STEP
 
 _EVIDENCE: Final = (SOURCE, SPECIFICATION, BUNDLE, DOCUMENT, KEY, PROOF, FLIGHT_LOG)
+#: the name that WebODM reads, and the endings of image files
+GEO_TXT: Final = "geo.txt"
+_IMAGES: Final = frozenset(
+    {".jpg", ".jpeg", ".tif", ".tiff", ".dng", ".png", ".heic", ".arw", ".cr2", ".cr3", ".nef", ".raf"}
+)
 _ONLY_PLAN: Final = f"of this run only the plan can be exported: `--to {PLAN}`"
 
 
 class ExportRequest(NamedTuple):
-    """A log or a run folder, the format, and the file that will be written (None: standard output)."""
+    """A log or a run folder, the format, and the file that will be written (None: standard output). `images` is the
+    folder with the image files of a geotag export; with `tag` their metadata is written too.
+    """
 
     run: Path
     format: str
     target: Path | None
+    images: Path | None = None
+    tag: bool = False
 
 
 class LogStatus(NamedTuple):
@@ -86,7 +99,9 @@ def accepted(format: str) -> Refusal | None:
 
 
 def name_for(run: Path, format: str) -> Path:
-    """The name of the file in the current folder: that of the run folder, or else of the log."""
+    """The name of the file in the current folder: that of the run folder, or else of the log; `geo.txt` for geotag."""
+    if format == GEOTAG:
+        return Path(GEO_TXT)
     log = log_of(run)
     name = log.resolve().parent.name if log.name == LOG else log.stem
     return Path(f"{name or 'flight'}.{format}")
@@ -94,7 +109,8 @@ def name_for(run: Path, format: str) -> Path:
 
 def export(request: ExportRequest) -> ExportedFile | Refusal:
     """Make the file, and write it if there is a target. Raises OSError."""
-    refused = accepted(request.format) or _unwritable(request.target, log_of(request.run), request.format)
+    refused = accepted(request.format) or _misused(request)
+    refused = refused or _unwritable(request.target, log_of(request.run), request.format)
     if refused is not None:
         return refused
     log = log_of(request.run)
@@ -110,13 +126,13 @@ def export(request: ExportRequest) -> ExportedFile | Refusal:
     status = _status(log)
     made_by = f"rtshcua {__version__}"
     exported = FlightExport(flight, _told(log, flight), made_by, status.verified, status.text)
-    made = _made(request.format, exported, log)
+    made = _geotag(request, exported) if request.format == GEOTAG else _made(request.format, exported, log)
     if isinstance(made, Refusal):
         return made
     if request.target is not None:
         write_out(request.target, made.data)
     warnings = made.warnings
-    if request.format not in (PLAN, TLOG):
+    if request.format not in (PLAN, TLOG, GEOTAG):
         warnings += tuple(_warnings(flight.telemetry, dropped))
     return ExportedFile(made.data, made.points, made.datum, status, warnings)
 
@@ -146,9 +162,10 @@ def _unwritable(target: Path | None, log: Path, format: str) -> Refusal | None:
     if kind in _EVIDENCE or target.samefile(log):
         name = "the log" if kind is None else kind.name
         return Refusal("output", f"`{target}` is {name}, and is not overwritten by an export", "name another file")
-    if target.suffix.lower() != f".{format}" and target.stat().st_size and not target.is_symlink():
+    ends = SUFFIXES.get(format, format)
+    if target.suffix.lower() != f".{ends}" and target.stat().st_size and not target.is_symlink():
         what = f"`{target}` exists and is not named as {format}, and is not overwritten by it"
-        return Refusal("output", what, f"name a file that ends in `.{format}`")
+        return Refusal("output", what, f"name a file that ends in `.{ends}`")
     return None
 
 
@@ -163,7 +180,7 @@ def _inconsistent(request: ExportRequest, flight: Flight) -> Refusal | None:
 
 def _lacking(request: ExportRequest, flight: Flight) -> Refusal | None:
     """The refusal if the telemetry lacks what the format shows."""
-    if request.format == PLAN:
+    if request.format in (PLAN, GEOTAG):
         return None
     if flight.telemetry is None:
         return Refusal("no-telemetry", f"`{request.run}` has no telemetry", _ONLY_PLAN, ExitCode.INPUT)
@@ -233,6 +250,93 @@ def _text_format(format: str, exported: FlightExport) -> tuple[Callable[[FlightE
         return geojson_file.geojson, geojson_file.DATUM
     assert format == CSV
     return csv_table.csv_table, csv_table.DATUM
+
+
+def _misused(request: ExportRequest) -> Refusal | None:
+    """The refusal of options that another format has, or that need each other."""
+    if request.format != GEOTAG and (request.images is not None or request.tag):
+        return Refusal("usage", f"`--images` and `--tag` are for `--to {GEOTAG}`")
+    if request.tag and request.images is None:
+        return Refusal("usage", "`--tag` needs the files", "name their folder with `--images`")
+    if request.images is not None and not request.images.is_dir():
+        return Refusal("input", f"`{request.images}` is not a folder", "name the folder with the images")
+    if request.tag and exiftool.installed() is None:
+        help = "install ExifTool (https://exiftool.org), or leave out `--tag`: `geo.txt` alone needs no tool"
+        return Refusal("no-exiftool", "`--tag` needs ExifTool, which is not installed", help, ExitCode.USAGE)
+    return None
+
+
+def _geotag(request: ExportRequest, exported: FlightExport) -> _Made | Refusal:
+    """The places of the images, written into their files too if that is requested."""
+    from rtshcua.ground.flight.export import geotag
+
+    images = images_of(exported.flight)
+    placed = [each for each in images.taken if each.is_placed]
+    if not placed:
+        return Refusal("no-image", f"the log of `{request.run}` has no image with a place", code=ExitCode.INPUT)
+    files = None if request.images is None else list(_files(request.images))
+    found = _matched(request, images.taken, files)
+    if isinstance(found, Refusal):
+        return found
+    pairs, how = found
+    pairs = tuple(each for each in pairs if each.image.is_placed)
+    if request.tag and request.images is not None:
+        origin = origin_of(exported.flight.genesis.vehicle, exported.flight.genesis.boot)
+        failed = _tag(geotag.exif_arguments(request.images.resolve(), pairs, origin), len(pairs))
+        if failed is not None:
+            return failed
+    warnings = tuple(_image_warnings(images, placed, pairs, files))
+    return _Made(geotag.geo_txt(exported, pairs, how), len(pairs), geotag.DATUM, warnings)
+
+
+def _matched(
+    request: ExportRequest, images: Sequence[FlightImage], files: Sequence[str] | None
+) -> tuple[tuple[NamedImage, ...], str] | Refusal:
+    """Each image with its file. The times of files are read only if neither names nor order tell."""
+    found = named(images, files, {})
+    program = exiftool.installed()
+    if not isinstance(found, Refusal) or found.slug != "no-match" or program is None:
+        return found
+    assert request.images is not None
+    try:
+        times_us = exiftool.times_us(program, request.images.resolve(), files or ())
+    except ExifToolError:
+        return found
+    return named(images, files, times_us)
+
+
+def _tag(arguments: Sequence[str], files: int) -> Refusal | None:
+    program = exiftool.installed()
+    assert program is not None
+    try:
+        exiftool.write(program, arguments, files)
+    except ExifToolError as error:
+        help = "each changed file has its original beside it, as `NAME_original`"
+        return Refusal("not-tagged", f"ExifTool failed: {visible(str(error))}", help, ExitCode.INPUT)
+    return None
+
+
+def _files(folder: Path) -> Iterator[str]:
+    """Yield the names of the images in a folder; links are left out."""
+    for each in folder.iterdir():
+        if each.suffix.lower() in _IMAGES and each.is_file() and not each.is_symlink():
+            yield each.name
+
+
+def _image_warnings(
+    images: FlightImages, placed: Sequence[FlightImage], pairs: Sequence[NamedImage], files: Sequence[str] | None
+) -> Iterator[str]:
+    """Yield what is missing or left out."""
+    if len(placed) < len(images.taken):
+        yield f"left out {many(len(images.taken) - len(placed), 'image')} without a place"
+    if len(pairs) < len(placed):
+        yield f"{many(len(placed) - len(pairs), 'image')} of the log without a file in the folder"
+    if files is not None and len(pairs) < len(files):
+        yield f"{many(len(files) - len(pairs), 'file')} in the folder without an image in the log"
+    if images.lost:
+        yield f"{many(images.lost, 'image')} of the flight missing: the log lists which"
+    if images.failed:
+        yield f"{many(len(images.failed), 'picture')} failed"
 
 
 def _plan(exported: FlightExport) -> _Made:

@@ -14,6 +14,7 @@ from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import many, seconds, true_to, utc
 from rtshcua.decision.tree import AtMost, Both, CodeScope, Either, Negation, Node, parse, scope_of
 from rtshcua.evidence.finding import Claim
+from rtshcua.evidence.images import MOST_GAPS
 from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.records import Close, Effect
 from rtshcua.evidence.report import LogReport
@@ -22,11 +23,13 @@ from rtshcua.ground.flight.flight_content import (
     AutopilotLogView,
     FlightReport,
     GapView,
+    ImageView,
     SignalCurve,
     SignalLimit,
     TrackView,
 )
 from rtshcua.ground.flight.flown import Flight
+from rtshcua.ground.flight.images import FlightImages, images_of
 from rtshcua.ground.flight.track import distance, home_of, place_at
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Invocation
@@ -45,6 +48,7 @@ def flight_view(
     genesis, ending = flight.genesis, _ending(flight, report)
     track = _track(flight)
     summary = FlightSummary(report, flight, collected, track, ending=ending, made_at_us=made_at_us, details=details)
+    images = images_of(flight)
     assert collected.names is not None
     return FlightReport(
         title=f"Flight of `{collected.mission().name}` on `{genesis.vehicle}`",
@@ -72,8 +76,14 @@ def flight_view(
         bound=tuple(map(_bound, bindings)) if details else (),
         timeline=timeline(flight, collected.mission(), collected.names, details=details),
         decisions=tuple(each._replace(where=_where(flight, track, each.t_us)) for each in collected.decision_views()),
+        images=tuple(_images(flight, images)),
         signals=_signals(flight),
-        gaps=(*_gaps_of_log(flight, report), *_gaps_of_telemetry(flight), *collected.gaps()),
+        gaps=(
+            *_gaps_of_log(flight, report),
+            *_gaps_of_telemetry(flight),
+            *_gaps_of_images(images),
+            *collected.gaps(),
+        ),
         proven=_texts(() if report is None else report.proven),
         unproven=_texts(() if report is None else report.unproven),
         records=tuple(collected.told),
@@ -107,6 +117,30 @@ def _track(flight: Flight) -> TrackView | None:
         return None
     places = tuple(flight.local(each.latitude, each.longitude) for each in telemetry.track)
     return TrackView(telemetry.track, places)
+
+
+def _images(flight: Flight, images: FlightImages) -> Iterator[ImageView]:
+    """Yield the images and the pictures that failed, in the order of their records."""
+    for each in sorted((*images.taken, *images.failed), key=lambda each: each.seq):
+        detail, where = each.detail, None
+        if detail.latitude is not None and detail.longitude is not None:
+            where = flight.local(detail.latitude, detail.longitude)
+        yield ImageView(
+            each.seq, each.t_us, detail.camera, detail.index, detail.asked, detail.above_home_mm, where,
+            None if detail.yaw_cd is None else detail.yaw_cd % 36_000, detail.pitch_cd, detail.attitude == "vehicle",
+            detail.horizontal_mm,
+        )  # fmt: skip
+
+
+def _gaps_of_images(images: FlightImages) -> Iterator[GapView]:
+    """Yield the last list of missing images of each camera that has some."""
+    for each in images.missing:
+        if each.missing:
+            lost = ", ".join(str(low) if low == high else f"{low} to {high}" for low, high in each.lost)
+            more = "" if len(each.lost) < MOST_GAPS else " and more"
+            yield GapView("images", f"{each.missing} of camera {each.camera}: {lost}{more}")
+    if images.failed:
+        yield GapView("images", f"{many(len(images.failed), 'picture')} failed, as the camera reported")
 
 
 def _where(flight: Flight, track: TrackView | None, t_us: int) -> tuple[int, int] | None:

@@ -24,6 +24,7 @@ from rtshcua.app.flights.left_over import HEX, LeftOver, ordinary_words, shape, 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Claim
+from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, encoded, read_image, read_missing
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Recover, Seal
 from rtshcua.evidence.report import LogReport
@@ -126,7 +127,16 @@ def _bare_claim(claim: Claim) -> Claim:
 def _without_texts(record: AnyRecord) -> AnyRecord:
     if isinstance(record, DecisionRecord):
         return msgspec.structs.replace(record, clause=None, clause_at=None, target=None)
-    return msgspec.structs.replace(record, detail="") if isinstance(record, Effect) else record
+    if not isinstance(record, Effect):
+        return record
+    return msgspec.structs.replace(record, detail=_numbers_of_images(record))
+
+
+def _numbers_of_images(record: Effect) -> str:
+    """The detail of a record about images without the names of files: numbers, which are removed by what they are."""
+    if record.event == IMAGE and (image := read_image(record.detail)) is not None:
+        return encoded(msgspec.structs.replace(image, file=""))
+    return record.detail if record.event == IMAGES_MISSING and read_missing(record.detail) is not None else ""
 
 
 class Redaction:

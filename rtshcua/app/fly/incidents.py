@@ -63,6 +63,8 @@ class Incidents:
             options += ["--battery", f"{start.battery / 100:g}"]
         if start.wind_mm_s is not None:
             options += ["--wind", f"{start.wind_mm_s / 1000:g},{start.wind_from_deg},{start.gust_mm_s / 1000:g}"]
+        options += ["--camera"] if self.scenario.has_camera else []
+        options += ["--gimbal"] if self.scenario.has_gimbal else []
         return options
 
     def begin(self, policy: PreparedPolicy, mission: Mission, simulator: Simulator) -> Refusal | None:

@@ -23,6 +23,7 @@ from rtshcua.app.fly.story import (
 )
 from rtshcua.app.fly.view_ports import LiveView
 from rtshcua.decision.outline import rings
+from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, read_image, read_missing
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
@@ -50,7 +51,7 @@ REPLACED = "replacement"
 #: shown in place of the fallback of a step that is refused before take-off
 NOTHING_FLIES = "no command is sent, because the vehicle is on the ground"
 #: effects of the boundary that repeat other records
-_NOT_SHOWN = frozenset({BOUNDARY, PERMITTED})
+_NOT_SHOWN = frozenset({BOUNDARY, PERMITTED, IMAGE})
 _SNAPSHOT_S = 0.1
 _WAITING_NOTE_S = 5.0
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
@@ -138,6 +139,27 @@ def _outline(zone: Zone) -> Iterator[tuple[int, ...]]:
         yield tuple(each for corner in ring[:: 1 + len(ring) // _MOST_CORNERS] for each in corner)
 
 
+class ImageCounts:
+    """The images of a flight in numbers: taken, failed, and missing by the last lists."""
+
+    def __init__(self) -> None:
+        self.taken = self.failed = 0
+        self._missing: dict[tuple[int, int], int] = {}
+
+    @property
+    def missing(self) -> int:
+        """The number of missing images."""
+        return sum(self._missing.values())
+
+    def add(self, event: str, detail: str) -> None:
+        """Count an effect, if it is about images."""
+        if event == IMAGE and (image := read_image(detail)) is not None:
+            self.taken += image.result
+            self.failed += 1 - image.result
+        elif event == IMAGES_MISSING and (told := read_missing(detail)) is not None:
+            self._missing[told.camera, told.series] = told.missing
+
+
 class Teller:
     """Translates each evidence line into a `Happening`, and counts.
 
@@ -160,6 +182,7 @@ class Teller:
         self.outcomes = dict.fromkeys(_OUTCOMES, 0)
         self.done: set[int] = set()
         self.unconfirmed: list[str] = []
+        self.images = ImageCounts()
 
     def replace(self, mission: Mission) -> None:
         """Use `mission` from now on."""
@@ -182,6 +205,8 @@ class Teller:
                 "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail,
                 waits, asks=self._asks(record),
             )  # fmt: skip
+        if record.type == "effect":
+            self.images.add(record.event, record.detail)
         if record.type != "effect" or record.event in _NOT_SHOWN:
             return None
         self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"

@@ -104,7 +104,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     `gaps_us`: the time without records because the computer stood still. `unconfirmed`: the fallbacks that ended
     without an observed landing. `may_fly`: why the vehicle may still fly unwatched. `drain_*` is the charge used in the
     worst minute, `km_*` per km over ground, both in 1/10000; a measured 0 means not measured. `battery` is that as
-    text.
+    text. `images_*` are the images that cameras reported, those that are missing, and pictures that failed.
     """
 
     mission: str
@@ -132,6 +132,9 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     drain_measured: int = 0
     km_declared: int = 0
     km_measured: int = 0
+    images_taken: int = 0
+    images_missing: int = 0
+    images_failed: int = 0
 
 
 Message = FlightPlanView | Snapshot | Happened | Note | Summary

@@ -13,6 +13,7 @@ from rtshcua.app.telling.people import NOBODY, People
 from rtshcua.app.wording import many
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.gaps import STALLED
+from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, read_image, read_missing
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
@@ -46,9 +47,31 @@ def detail_of(event: str, detail: str, people: People = NOBODY) -> str:
         return f"it flies to {latitude / 1e7:.7f}, {longitude / 1e7:.7f}, {up / 1_000:.1f} m above the sea"
     if event == BOUNDARY:
         return _stated(detail)
+    if event in (IMAGE, IMAGES_MISSING):
+        return _imaged(detail)
     if event in _TIMED:
         return _US.sub(lambda found: found[1] + prose.duration(int(found[2])), detail)
     return f"the same decision {detail} more times" if event == "repeated" else detail
+
+
+def _imaged(detail: str) -> str:
+    """An image, or the list of missing ones, as a camera reports them."""
+    image, gaps = read_image(detail), read_missing(detail)
+    if image is not None:
+        if image.index is None:
+            return f"camera {image.camera} reports a picture that failed"
+        where = ""
+        if image.latitude is not None and image.longitude is not None:
+            where = f" at {image.latitude / 1e7:.7f}, {image.longitude / 1e7:.7f}"
+        height = "" if image.above_home_mm is None else f", {image.above_home_mm / 1_000:.1f} m above home"
+        again = f" (requested {many(image.asked, 'time')})" if image.asked else ""
+        return f"camera {image.camera} took image {image.index}{where}{height}{again}"
+    if gaps is None:
+        return "no record of an image"
+    lost = ", ".join(str(low) if low == high else f"{low} to {high}" for low, high in gaps.lost)
+    failed = f"; {many(gaps.failed, 'picture')} failed" if gaps.failed else ""
+    counted = f"{many(gaps.taken, 'image')} of camera {gaps.camera}, {gaps.missing} missing"
+    return f"{counted}{f': {lost}' if lost else ''}{failed}"
 
 
 def _stated(detail: str) -> str:

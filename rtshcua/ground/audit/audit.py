@@ -10,6 +10,7 @@
     (`documents`)
 14. evidence before effect: each dispatch follows a record that permits it, in the right order (`dispatches`); not in
     mode `none`
+15. images: none is recorded twice, and the lists of missing ones agree with the records (`rtshcua.evidence.images`)
 
 Of several flaws, the first of these is reported: genesis and trust, the log itself, anchors, the boundary's own
 evidence, the meaning of the records. A log that is not intact proves nothing, so its own flaws come before those of its
@@ -24,8 +25,9 @@ from typing import NamedTuple
 
 from rtshcua.evidence.attested import BoundaryEvidence
 from rtshcua.evidence.finding import Claim, Finding, Flaw
+from rtshcua.evidence.images import ImageLedger
 from rtshcua.evidence.log_writer import origin_of
-from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis
+from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis, Recover
 from rtshcua.evidence.report import LogReport, claims, with_anchors, with_boundary
 from rtshcua.evidence.verify import LogVerifier
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
@@ -78,6 +80,14 @@ def record_claims(basis: Basis, meaning: RecordAudit) -> Claims:
     return tuple(proven), tuple(unproven)
 
 
+def image_claims(images: ImageLedger) -> Claims:
+    """Return the claims about images that the log proves, and those that stay unproven; none without images."""
+    if not images.taken:
+        return (), ()
+    text = f"{_many(images.taken, 'image')}, each recorded once; the lists of missing ones agree with these records"
+    return (Claim("images", text),), (Claim("images", "that an image exists, and was taken where its record says"),)
+
+
 def _signed_by(people: list[str]) -> str:
     return f" by {' and '.join(people)}" if people else ""
 
@@ -124,6 +134,7 @@ class Auditor:
         self._untrusted: Finding | None = None
         self._contradicted: Finding | None = None
         self._suspect: Finding | None = None
+        self._images = ImageLedger()
         self._boundary: BoundaryEvidence | None = None
         self._unattested: Finding | None = None
 
@@ -143,6 +154,8 @@ class Auditor:
         if self._unattested is None and self._boundary is not None and not isinstance(record, Genesis):
             self._unattested = self._attested(self._boundary, record, verifier.offset - len(line))
         if self._suspect is None and self._meaning is not None and (flaw := self._meaning.check(record)):
+            self._suspect = flaw.at(record.seq, verifier.offset - len(line))
+        if self._suspect is None and isinstance(record, Effect | Recover) and (flaw := self._images.check(record)):
             self._suspect = flaw.at(record.seq, verifier.offset - len(line))
         return True
 
@@ -210,9 +223,9 @@ class Auditor:
         report = with_boundary(report, self._boundary.gaps)
         seen, unseen = self._boundary.claims()
         shortfall = report.shortfall or self._boundary.shortfall()
-        report = report._replace(
-            proven=(*report.proven, *seen), unproven=(*report.unproven, *unseen), shortfall=shortfall
-        )
+        counted, unsure = image_claims(self._images)
+        proven, unproven = (*report.proven, *seen, *counted), (*report.unproven, *unseen, *unsure)
+        report = report._replace(proven=proven, unproven=unproven, shortfall=shortfall)
         if self._meaning is None:
             unproven = (*report.unproven, Claim("decisions", _NOT_DERIVED))
             return trusted(report._replace(unproven=unproven), self._basis)

@@ -10,7 +10,18 @@ from rtshcua.ground.checker.fitting import stored
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.checker.types import COUNT, EXAMPLES, number
 from rtshcua.ground.checker.values import typed
-from rtshcua.model.faults import KINDS, SIGNED, WORD_TYPES, Direction, Fault, FaultField, FlightMode, Voice, parameters
+from rtshcua.model.faults import (
+    KINDS,
+    SIGNED,
+    WORD_TYPES,
+    CameraCounter,
+    Direction,
+    Fault,
+    FaultField,
+    FlightMode,
+    Voice,
+    parameters,
+)
 from rtshcua.model.ir.expression import Reference, Value
 from rtshcua.model.ir.scenarios import FaultCall
 from rtshcua.model.ir.skills import ArgumentValue
@@ -98,7 +109,7 @@ def _value(context: CheckContext, call: FaultCall, parameter: FaultField, value:
 
 def _word(
     context: CheckContext, call: FaultCall, parameter: FaultField, value: Value
-) -> FlightMode | Direction | Voice | bool | None:
+) -> FlightMode | Direction | Voice | CameraCounter | bool | None:
     word = value.name if isinstance(value, Reference) else None
     if word not in parameter.words:
         words = parameter.words

@@ -187,10 +187,13 @@ class FlightMark(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FlownWay:
-    """A flown track in parts, which gaps of the telemetry separate, and marks along it."""
+    """A flown track in parts, which gaps of the telemetry separate, marks along it, and the places of images with their
+    titles, which are drawn without labels.
+    """
 
     parts: tuple[tuple[FlownPlace, ...], ...]
     marks: tuple[FlightMark, ...] = ()
+    images: tuple[tuple[int, int, str], ...] = ()
 
 
 def planned_legs(way: PlannedWay, site: Site) -> Iterator[PlannedLeg]:

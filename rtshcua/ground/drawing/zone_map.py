@@ -153,6 +153,8 @@ def _chords(ground: ZoneOutline, y: int) -> Iterator[tuple[int, int]]:
 _TINY = 30
 #: px: the least width of a band, and the least radius of the circle around home
 LEAST_BAND, LEAST_CIRCLE = 2.0, 6
+#: mm: images that are said to be farther from home than this do not enlarge a map
+MOST_AWAY = 20_000_000
 #: the most points of a track that keep labels away
 _TRACK = 500
 #: how the zones of each kind are drawn
@@ -210,7 +212,7 @@ class DrawnBand(NamedTuple):
 class ZoneMap:
     """A map; `bar` is the length of the scale bar in px, and what that is. `margin` is the band of the position error
     around the way, `stopping` where the vehicle would stop beyond the ends of its legs, and `homeward` the ways home.
-    `ways`, `failed` and `flown` are the points of lines.
+    `ways`, `failed` and `flown` are the points of lines, `images` the places of images.
     """
 
     title: str
@@ -229,6 +231,7 @@ class ZoneMap:
     flown: tuple[str, ...]
     stops: tuple[tuple[float, float], ...]
     marks: tuple[DrawnMark, ...]
+    images: tuple[DrawnMark, ...]
     labels: tuple[MapLabel, ...]
     bar: tuple[float, str]
     keys: tuple[DrawingKey, ...]
@@ -269,6 +272,7 @@ def mission_map(
     if flown is not None:
         places += [(each.x, each.y) for part in flown.parts for each in part]
         places += [(each.x, each.y) for each in flown.marks]
+        places += [(x, y) for x, y, _ in flown.images if max(abs(x), abs(y)) < MOST_AWAY]
     error = site.margins.position_error
     extent = extent_of_places(places)
     extent = DrawnExtent(extent.west - error, extent.south - error, extent.east + error, extent.north + error)
@@ -349,6 +353,7 @@ def _map(
         flown=drawn.flown,
         stops=tuple(drawn.stops),
         marks=drawn.marks,
+        images=drawn.images,
         labels=tuple(labels.placed),
         bar=bar,
         keys=(*_zone_keys(on, outlines, zones), *drawn.keys, *_home_keys(site, on)),
@@ -387,6 +392,7 @@ class _DrawnWay(NamedTuple):
     flown: tuple[str, ...] = ()
     stops: Mapping[tuple[float, float], Sequence[int]] = MappingProxyType({})
     marks: tuple[DrawnMark, ...] = ()
+    images: tuple[DrawnMark, ...] = ()
     lines: tuple[Sequence[tuple[float, float]], ...] = ()
     keys: tuple[DrawingKey, ...] = ()
 
@@ -413,6 +419,7 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
         flown=tuple(map(points, tracks)),
         stops=_stops(on, shown.way, site),
         marks=tuple(marks),
+        images=() if flown is None else tuple(DrawnMark(*on.at(x, y), "image", told) for x, y, told in flown.images),
         lines=(line, *homeward, *(_thinned_line(each) for each in tracks)),
     )
     return way._replace(keys=tuple(_way_keys(site, way)))
@@ -435,6 +442,8 @@ def _way_keys(site: Site, way: _DrawnWay) -> Iterator[DrawingKey]:
         yield DrawingKey("failed-mark", "where it leaves the airspace first")
     if way.flown:
         yield DrawingKey("flown", "the flown track")
+    if way.images:
+        yield DrawingKey("image-mark", "an image, where its camera says that it was taken")
     if kinds & EVENTS:
         yield DrawingKey("event-mark", "a decision, with the number of its record")
 

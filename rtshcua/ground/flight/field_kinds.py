@@ -23,6 +23,7 @@ from rtshcua.ground.flight.flight_content import (
     DecisionView,
     FlightReport,
     GapView,
+    ImageView,
     ListedRecord,
     ReadSignal,
     SignalCurve,
@@ -63,9 +64,9 @@ KINDS: Final[Mapping[type, Mapping[str, FieldKind]]] = {
         "begun_utc_us": _.TIME, "lasted_us": _.TIME, "ending": _.MACHINE, "steps_done": _.MACHINE, "steps": _.MACHINE,
         "highest": _.HEIGHT, "distance": _.NO_PLACE, "verdict": _.MACHINE, "pinned": _.TEXT, "origin": _.NAME, "root":
         _.MACHINE, "summary": _.PART, "projection": _.NO_PLACE, "site": _.PART, "way": _.PART, "track": _.PART, "bound":
-        _.OUTSIDE, "timeline": _.PART, "decisions": _.PART, "signals": _.PART, "gaps": _.PART, "proven": _.TEXT,
-        "unproven": _.TEXT, "records": _.PART, "totals": _.MACHINE, "log": _.LOG, "redacted": _.MACHINE,
-        "simulated": _.MACHINE,
+        _.OUTSIDE, "timeline": _.PART, "decisions": _.PART, "images": _.PART, "signals": _.PART, "gaps": _.PART,
+        "proven": _.TEXT, "unproven": _.TEXT, "records": _.PART, "totals": _.MACHINE, "log": _.LOG,
+        "redacted": _.MACHINE, "simulated": _.MACHINE,
     },
     SummaryLine: {"question": _.MACHINE, "answer": _.TEXT},
     ReadSignal: {"name": _.WORD, "value": _.VALUE, "age_us": _.TIME},
@@ -77,6 +78,11 @@ KINDS: Final[Mapping[type, Mapping[str, FieldKind]]] = {
     },
     TimelineEvent: {
         "lane": _.MACHINE, "t_us": _.TIME, "until_us": _.TIME, "kind": _.MACHINE, "told": _.TEXT, "seq": _.MACHINE,
+    },
+    ImageView: {
+        "seq": _.MACHINE, "t_us": _.TIME, "camera": _.MACHINE, "number": _.MACHINE, "asked": _.MACHINE,
+        "above_home": _.HEIGHT, "where": _.NO_PLACE, "heading": _.NO_PLACE, "pitch": _.HEIGHT, "of_vehicle": _.MACHINE,
+        "accuracy": _.NO_PLACE,
     },
     SignalLimit: {"value": _.VALUE, "low": _.MACHINE, "told": _.OUTSIDE},
     SignalCurve: {"series": _.PART, "limits": _.PART},

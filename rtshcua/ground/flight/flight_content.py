@@ -104,6 +104,25 @@ class TrackView(NamedTuple):
     places: tuple[tuple[int, int], ...]
 
 
+class ImageView(NamedTuple):
+    """An image as its camera reported it, or a picture that failed (`number` None); `seq` is its record, `where` its
+    place, `asked` how often the report was requested again. `heading` is from north and `pitch` from the horizon, in
+    1/100 degree, of the camera, or of the vehicle if `of_vehicle`. `accuracy` is that of the GPS, horizontally.
+    """
+
+    seq: int
+    t_us: int
+    camera: int
+    number: int | None
+    asked: int
+    above_home: int | None
+    where: tuple[int, int] | None
+    heading: int | None
+    pitch: int | None
+    of_vehicle: bool
+    accuracy: int | None
+
+
 class AutopilotLogView(NamedTuple):
     """The autopilot's own log, bound to this one: what it is, and whether its track agrees with ours, in words."""
 
@@ -117,9 +136,9 @@ class FlightReport(NamedTuple):
 
     `highest` is the greatest height above home, and `distance` that over ground, by the telemetry. `verdict` is that
     of the verification that made the page, `verified`, `incomplete` or `failed`; or else the log is still `growing`, or
-    closed and `unverified`. `log` is the
-    log as the page embeds it, empty if it is too large; `redacted` names what was removed.
-    `projection` is that of the local plane. `simulated`: the flight says that nothing flew.
+    closed and `unverified`. `images` are those of the log, and `gaps` tells which are missing. `log` is the log as the
+    page embeds it, empty if it is too large; `redacted` names what was removed. `projection` is that of the local
+    plane. `simulated`: the flight says that nothing flew.
     """
 
     title: str
@@ -147,6 +166,7 @@ class FlightReport(NamedTuple):
     bound: tuple[AutopilotLogView, ...]
     timeline: tuple[TimelineEvent, ...]
     decisions: tuple[DecisionView, ...]
+    images: tuple[ImageView, ...]
     signals: tuple[SignalCurve, ...]
     gaps: tuple[GapView, ...]
     proven: tuple[str, ...]

@@ -50,6 +50,8 @@ _BEFORE: Final = 20
 _MOST_POINTS: Final = 1_200
 #: the most decisions that are marked on the map
 _MOST_MARKS: Final = 20
+#: the most images on the map
+_MOST_IMAGES: Final = 5_000
 #: the width of the drawing of a signal, px
 _NARROW: Final = 520
 
@@ -95,6 +97,8 @@ def page(report: FlightReport, *, live: bool = False, tiles: str = "") -> str:
         chunks=_chunks,
         clocked=clocked,
         aged=aged,
+        degrees=_degrees,
+        metres=_metres,
     )
 
 
@@ -142,7 +146,10 @@ def _flown(report: FlightReport) -> FlownWay | None:
         for each in sorted(first, key=lambda each: each.t_us)
         if each.where is not None or not track.places
     )  # fmt: skip
-    return FlownWay(tuple(tuple(flown[part.start : part.stop]) for part in parts(track.points)), marks)
+    images = tuple(
+        (*each.where, f"image {each.number}") for each in report.images[:_MOST_IMAGES] if each.where is not None
+    )
+    return FlownWay(tuple(tuple(flown[part.start : part.stop]) for part in parts(track.points)), marks, images)
 
 
 def _scaled(points: Sequence[tuple[int, int | None]], divide: int) -> list[tuple[int, float | None]]:
@@ -186,6 +193,16 @@ def clocked(t_us: int) -> str:
 def aged(us: int) -> str:
     """An age, to the precision that a person can use."""
     return display(-(-us // 1_000) * 1_000, Dimension.DURATION) if us < 10_000_000 else f"{us // 1_000_000} s"
+
+
+def _degrees(cd: int | None) -> str:
+    """An angle in 1/100 degree, to a tenth."""
+    return "" if cd is None else f"{'-' * (cd < 0)}{abs(cd) // 100}.{abs(cd) % 100 // 10}°"
+
+
+def _metres(mm: int | None) -> str:
+    """A length in mm, to a tenth of a metre."""
+    return "" if mm is None else f"{'-' * (mm < 0)}{abs(mm) // 1_000}.{abs(mm) % 1_000 // 100} m"
 
 
 def _chunks(digest: str) -> list[str]:

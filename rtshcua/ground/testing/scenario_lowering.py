@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
-from rtshcua.ground.checker.checks.scenarios import OBSTACLE
+from rtshcua.ground.checker.checks.scenarios import FITTED, OBSTACLE
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.faults import fault_of
 from rtshcua.ground.checker.symbols import correction, suggestion
@@ -156,6 +156,9 @@ class _Lowering:
                 continue
             if isinstance(each, Charge):
                 start = replace(start, battery=each.value.value)
+                continue
+            if each.name.text in FITTED:
+                start = replace(start, **{each.name.text: True})
                 continue
             wind = fault_of(self._context, each)
             assert isinstance(wind, WindStep)

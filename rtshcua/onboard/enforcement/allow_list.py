@@ -1,9 +1,10 @@
 """The allow-list of frames: which ones may be sent without a permit, and which carry out the permitted command.
 
 Housekeeping moves nothing. Requests (also for the list of logs, not for their data), telemetry rates, texts and our
-own heartbeat always pass. A geofence may be uploaded before the flight, never during it; the same applies to the two
-parameters that switch ArduCopter's fence on. Nothing else is housekeeping: no mission upload, signing key, file access
-or manual control. Other parameters are set only as listed in a preparation (`written`, `frames.py`).
+own heartbeat always pass. All are for the autopilot, except requests for the reports of a camera (`asks_camera`). A
+geofence may be uploaded before the flight, never during it; the same applies to the two parameters that switch
+ArduCopter's fence on. Nothing else is housekeeping: no mission upload, signing key, file access or manual control.
+Other parameters are set only as listed in a preparation (`written`, `frames.py`).
 
 A frame carries out a command if every field that the autopilot acts on has the value in the command: the number,
 each parameter, the frame of reference, the point, its height and heading, the speed, the mode. Values must be equal
@@ -82,6 +83,23 @@ def is_housekeeping(frame: Frame) -> bool:
 
 #: the system id of a ground station, by convention and by ArduPilot's default of `SYSID_MYGCS`
 _GROUND_STATION: Final = 255
+
+
+#: the components that are cameras
+CAMERAS: Final = range(enums.MAV_COMP_ID_CAMERA, enums.MAV_COMP_ID_CAMERA6 + 1)
+
+
+def asks_camera(frame: Frame) -> bool:
+    """Whether the frame requests one report of a camera that is a component of its own: that of an image, by its index
+    (parameter 2), or how many images it has taken. It is housekeeping too.
+    """
+    if frame.message != COMMAND_LONG or frame.target is None or frame.target[1] not in CAMERAS:
+        return False
+    if _command_number(frame.fields) != enums.MAV_CMD_REQUEST_MESSAGE:
+        return False
+    message, index, *rest = _parameters(frame.fields)
+    about = message == layouts.CAMERA_IMAGE_CAPTURED or (message == layouts.CAMERA_CAPTURE_STATUS and index == 0)
+    return about and not any(rest)
 
 
 def is_greeting(frame: Frame) -> bool:

@@ -234,7 +234,7 @@ class FrameSession:
 
     def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
         """Why a frame is refused, or else whether it carries out a command."""
-        # 1. exactly one frame, from us, to the autopilot that was heard, and to nobody else
+        # 1. exactly one frame, from us, to the autopilot that was heard, or to a camera beside it, and to nobody else
         frame = read_frame(octets)
         if frame is None:
             return NOT_ONE_FRAME
@@ -265,7 +265,8 @@ class FrameSession:
         if (frame.system, frame.component) != (self._system, OURS):
             return NOT_OURS
         if frame.target is not None and frame.target != (self._system, AUTOPILOT):
-            return WRONG_TARGET
+            camera = frame.target[0] == self._system and allow_list.asks_camera(frame)
+            return None if camera else WRONG_TARGET
         return FORCED_ARMING if allow_list.is_forced_arming(frame) else None
 
     def _refuse_ahead(self, octets: bytes, command: Command) -> Refusal | None:

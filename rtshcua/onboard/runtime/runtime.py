@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, ImageLedger, MissingDetail, encoded
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now
@@ -34,7 +35,10 @@ CLIENT: Final = "client"
 REFUSED_EVERY_US: Final = 1_000_000
 
 #: events that are processed before a crash or a takeover: they change no stage, and explain its cause
-_TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.StatusText, ports.Noted, ports.Hindered)
+_TOLD: Final = (
+    Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.StatusText, ports.Noted, ports.Hindered,
+    ports.ImageReported, ports.ImagesExpected,
+)  # fmt: skip
 
 
 class Runtime:
@@ -174,6 +178,8 @@ class EventHandler:
         self._controller = controller
         self._journal = journal
         self._boundary = boundary
+        self._images = ImageLedger()
+        self._told_missing: dict[tuple[int, int], MissingDetail] = {}  # by camera and series
         self._gap = False  # records cannot be stored, and that was recorded
         self._refused_us: int | None = None  # when a refused document was last recorded,
         self._unrecorded = 0  # and how many were refused since
@@ -234,6 +240,19 @@ class EventHandler:
                 self._controller.dispatcher.hindered(now, event)
             case ports.Anchored():
                 self._journal.effect(now, ANCHORED, detail=event.note)
+            case ports.ImageReported():
+                if self._images.add(event.detail) is None:
+                    self._journal.effect(now, IMAGE, detail=event.detail)
+            case ports.ImagesExpected():
+                self._images_expected(now, event)
+
+    def _images_expected(self, now: Now, event: ports.ImagesExpected) -> None:
+        """Record which images are missing, where that is not recorded already."""
+        told = self._images.missing(event.camera, event.series, event.first, event.last)
+        key = told.camera, told.series
+        if (told.taken or told.missing or told.failed) and self._told_missing.get(key) != told:
+            self._told_missing[key] = told
+            self._journal.effect(now, IMAGES_MISSING, detail=encoded(told))
 
     def _ended(self, now: Now, event: TakenOver | Crashed) -> None:
         crashed = isinstance(event, Crashed)

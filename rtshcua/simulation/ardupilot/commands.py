@@ -6,6 +6,7 @@ from math import isfinite, radians
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.model.faults import FlightMode
+from rtshcua.simulation.ardupilot.payload_commands import PAYLOAD_COMMANDS
 from rtshcua.simulation.autopilot import Autopilot, Handler
 from rtshcua.simulation.command import VehicleCommand, whole
 from rtshcua.simulation.commands import ACCEPTED, DENIED, FAILED, arm_disarm, shared
@@ -142,4 +143,5 @@ COMMANDS: Mapping[int, Handler] = shared(mode=FAILED, stream=DENIED, says_why=Tr
     mavlink.MAV_CMD_MISSION_START: _mission_start,
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
     mavlink.MAV_CMD_DO_FENCE_ENABLE: _fence_enable,
+    **PAYLOAD_COMMANDS,
 }

@@ -193,6 +193,7 @@ class ArduCopter(Flavour):
             VehicleEvent.AUTO_DISARMED: "Disarming motors",
         }
     )
+    speaks_for_payload = True
     texts_need_ground_station = False
     check_text = "PreArm"
     falls_back = False

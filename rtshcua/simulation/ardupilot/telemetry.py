@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Message, maker
 from rtshcua.model.faults import FlightMode
+from rtshcua.simulation.ardupilot.payload_commands import PAYLOAD_BUILDERS
 from rtshcua.simulation.autopilot import Autopilot, Builder
 from rtshcua.simulation.telemetry import COMMON, GOOD_FLAGS, LOST_FLAGS, autopilot_version, extended_sys_state
 
@@ -91,6 +92,7 @@ BUILDERS: Mapping[int, Builder] = COMMON | {
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version(mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT, 0, 0),
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _position_target,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: _timesync,
+    **PAYLOAD_BUILDERS,
 }
 
 DEFAULT: Mapping[int, int] = {

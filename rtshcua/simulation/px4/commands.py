@@ -170,6 +170,44 @@ def _mission_start(a: Autopilot, command: VehicleCommand) -> tuple[int, ...]:
     return (ACCEPTED,)
 
 
+def _silent(_: Autopilot, __: VehicleCommand) -> tuple[int, ...]:
+    """Do not answer: the command is for a camera or a gimbal (recorded)."""
+    return ()
+
+
+def _accept(_: Autopilot, __: VehicleCommand) -> tuple[int, ...]:
+    """Accept without effect: a region of interest does not turn the vehicle, and nothing is connected (recorded)."""
+    return (ACCEPTED,)
+
+
+def _grip(a: Autopilot, _: VehicleCommand) -> tuple[int, ...]:
+    """Handle DO_GRIPPER, which is acknowledged without any gripper (recorded)."""
+    return (ACCEPTED,) if a.vehicle.in_air else (mavlink.MAV_RESULT_IN_PROGRESS, ACCEPTED)
+
+
+_PAYLOAD: Mapping[int, Handler] = {
+    **dict.fromkeys(
+        (
+            mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION, mavlink.MAV_CMD_SET_CAMERA_MODE,
+            mavlink.MAV_CMD_SET_CAMERA_ZOOM, mavlink.MAV_CMD_DO_DIGICAM_CONTROL, mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
+            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+            mavlink.MAV_CMD_DO_MOUNT_CONFIGURE, mavlink.MAV_CMD_DO_WINCH,
+        ),
+        _silent,
+    ),
+    **dict.fromkeys(
+        (
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_DO_SET_ROI_NONE,
+            mavlink.MAV_CMD_DO_SET_ACTUATOR,
+        ),
+        _accept,
+    ),
+    mavlink.MAV_CMD_DO_GRIPPER: _grip,
+}  # fmt: skip
+"""Commands for payloads, as recorded; those that are missing here are unsupported. A camera and a gimbal are
+components of their own (`simulation.components`), and change nothing of these answers.
+"""
 _SHARED = shared(mode=TEMPORARILY_REJECTED, stream=FAILED, says_why=False, message=DENIED, needs_one=True)
 COMMANDS: Mapping[int, Handler] = _SHARED | {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: arm_disarm(
@@ -181,4 +219,5 @@ COMMANDS: Mapping[int, Handler] = _SHARED | {
     mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_MISSION_START: _mission_start,
+    **_PAYLOAD,
 }

@@ -164,6 +164,7 @@ class Px4(Flavour):
             VehicleEvent.AUTO_DISARMED: "Disarmed by landing\t",
         }
     )
+    speaks_for_payload = False
     texts_need_ground_station = True
     check_text = "Preflight Fail"
     falls_back = True

@@ -412,6 +412,35 @@ def test_we_speak_as_ourselves_and_to_the_autopilot_alone() -> None:
         assert gate.seal(pack(asking), NOW) is WRONG_TARGET
 
 
+def test_a_camera_is_asked_for_reports_on_images_and_for_nothing_else() -> None:
+    gate = session(PX4, command(K.LAND))
+    for allowed in (
+        long(512, 263, 7, component=100),
+        long(512, 263, 16_777_216, component=105),
+        long(512, 262, component=101),
+    ):
+        assert isinstance(gate.seal(pack(allowed), NOW), bytes), allowed
+    for refused in (
+        long(512, 263, 7, component=99),
+        long(512, 263, 7, component=106),
+        long(512, 263, 7, component=154),
+        long(512, 263, 7, component=0),
+        long(512, 263, 7, system=SYSTEM + 1, component=100),
+        long(512, 263, 7, 1, component=100),
+        long(512, 262, 1, component=100),
+        long(512, 259, component=100),
+        long(511, 263, 100_000, component=100),
+        long(2000, 0, 0, 1, 1, component=100),
+        long(400, 1, component=100),
+        long(400, 1, 21196, component=100),
+        m.MAVLink_command_int_message(SYSTEM, 100, 0, 512, 0, 0, 263, 7, 0, 0, 0, 0, 0),
+        m.MAVLink_param_request_list_message(SYSTEM, 100),
+    ):
+        assert gate.seal(pack(refused), NOW) is WRONG_TARGET, refused
+    assert session(PX4).seal(pack(long(512, 263, 7, component=100)), NOW) is not WRONG_TARGET
+    assert FrameSession().seal(pack(long(512, 263, 7, component=100)), NOW) is NO_VEHICLE
+
+
 def test_a_command_begins_in_its_time_and_goes_on_after_it() -> None:
     gate, land = session(PX4, command(K.LAND)), pack(long(176, 1, 4, 6))
     assert gate.seal(land, LATEST + 1) is LATE

@@ -14,7 +14,32 @@ from rtshcua.simulation.world import Simulation
 from virtual.rows import rows
 
 HEARD = [kind for kind in mavlink.mavlink_map.values() if kind.msgname in _HANDLERS]
-COMMANDS = [16, 17, 20, 21, 22, 34, 115, 176, 178, 186, 192, 193, 207, 224, 300, 400, 511, 512, 5001, 5002, 5003, 5100]
+PAYLOADS = [183, 195, 201, 203, 204, 205, 206, 530, 531, 1000, 1001, 2000, 2001]
+COMMANDS = [
+    *PAYLOADS,
+    16,
+    17,
+    20,
+    21,
+    22,
+    34,
+    115,
+    176,
+    178,
+    186,
+    192,
+    193,
+    207,
+    224,
+    300,
+    400,
+    511,
+    512,
+    5001,
+    5002,
+    5003,
+    5100,
+]
 NAMES = [b"FENCE_ENABLE", b"FENCE_TYPE", b"GF_ACTION", b"GF_MAX_HOR_DIST", b"RTL_ALT", b"MAV_SIGN_CFG", b"NONE"]
 FLOATS = [nan, inf, -inf, 0.0, 1.0, -1.0, 3.0, 47.4, 8.5, 1e30, 21196.0, 512.0, 497.0]
 BITS = {f"{sign}int{bits}_t": (sign, bits) for sign in ("u", "") for bits in (8, 16, 32, 64)}
@@ -23,7 +48,8 @@ BITS = {f"{sign}int{bits}_t": (sign, bits) for sign in ("u", "") for bits in (8,
 def value(chance: Random, name: str, type_: str, length: int) -> Any:
     """Draw a value that is often a meaningful one."""
     likely = {
-        "target_system": [1], "target_component": [1, 0], "command": COMMANDS, "mission_type": [0, 0, 1, 2, 3, 255],
+        "target_system": [1], "target_component": [1, 0, 100, 154], "command": COMMANDS,
+        "mission_type": [0, 0, 1, 2, 3, 255],
         "seq": range(5), "count": range(5), "frame": [0, 2, 3, 6, 10, 77], "coordinate_frame": [5, 6, 77],
         "param_id": NAMES,
     }  # fmt: skip
@@ -44,7 +70,9 @@ def one(chance: Random, type_: str) -> int | float:
 
 def bombard(seed: int) -> Simulation:
     chance = Random(seed)
-    simulation = Simulation(SimulationConfig(flavour=chance.choice(list(AutopilotKind)), seed=seed))
+    simulation = Simulation(
+        SimulationConfig(flavour=chance.choice(list(AutopilotKind)), seed=seed, camera=True, gimbal=True)
+    )
     codec = Codec(255, 190)
     simulation.advance(1_500_000)
     for _ in range(60):

@@ -1,6 +1,7 @@
 """Every kind of vehicle fault has a visible effect."""
 
 from collections.abc import Callable
+from math import nan
 from typing import Any
 
 import pytest
@@ -50,6 +51,11 @@ EXAMPLES: dict[str, Callable[[int], Fault]] = {
     "stale": lambda at: faults.StaleSource(at, 500_000),
     "stuck": lambda at: faults.MessageStuck(at, POSITION),
     "mute": lambda at: faults.MessageSilence(at, POSITION),
+    "camera-loss": lambda at: faults.CameraLoss(at, 10_000),
+    "camera-slow": lambda at: faults.CameraSlow(at, 2 * S),
+    "camera-full": faults.CameraFull,
+    "camera-reboot": faults.CameraReboot,
+    "gimbal-stuck": faults.GimbalStuck,
 }
 #: faults without effect on ArduCopter on a leg
 LANDING = {"pilot-sticks"}
@@ -65,12 +71,16 @@ def on_its_way() -> dict[str, Any]:
 
 
 def flying(pilot: Callable[..., Any], flavour: str) -> Any:
-    p = pilot(flavour)
+    p = pilot(flavour, camera=True, gimbal=True)
     for number in (1, 24, 30, 33, 132, 147, 193, 230):
         p.long(511, number, 100_000)
     p.take_off(20)
     p.go_to(300, 0, 20)
     p.wait(5)
+    p.long(2000, 0, 1, 0, 0, component=100)
+    p.long(511, 285, 200_000)
+    p.long(1001, 255, 190, component=154)
+    p.long(1000, nan, nan, -3, 0, component=154)  # turns down slowly
     return p
 
 
@@ -108,7 +118,14 @@ def test_host_faults_have_no_effect_and_unknown_kinds_are_refused() -> None:
     on = Affected(Autopilot(FLAVOURS[AutopilotKind.PX4], SimulationConfig()), None, None, None, None)  # type: ignore[arg-type]
     assert not list(effects(faults.DiskFull(0), on))
     assert not list(effects(faults.Recall(0), on))
-    bases = (Fault, faults.LinkFault, faults.ReceiverFault, faults.AutopilotFault, faults.PilotFault)
+    bases = (
+        Fault,
+        faults.LinkFault,
+        faults.ReceiverFault,
+        faults.AutopilotFault,
+        faults.PilotFault,
+        faults.PayloadFault,
+    )
     for base in bases:
         with pytest.raises(TypeError, match=base.__name__):
             list(effects(base(0), on))

@@ -43,13 +43,13 @@ def test_modes_are_listed_together_and_singly(pilot: Pilots, flavour: str) -> No
     assert modes_asked(a, 99) == ([refused], [])
 
 
-@pytest.mark.parametrize("number", [397, 395, 300, 259, 280, 411])
+@pytest.mark.parametrize("number", [397, 395, 300, 158, 263, 411])
 def test_unknown_messages_are_refused(pilot: Pilots, flavour: str, number: int) -> None:
     a = pilot(flavour).ready()
     assert a.long(512, number) == [2 if a.px4 else 4]
 
 
-@pytest.mark.parametrize("command", [519, 521, 2504, 31010, 9])
+@pytest.mark.parametrize("command", [519, 523, 2504, 31010, 9])
 def test_unknown_commands_are_unsupported(pilot: Pilots, flavour: str, command: int) -> None:
     assert pilot(flavour).ready().long(command) == [3]
 

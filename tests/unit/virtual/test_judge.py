@@ -1,5 +1,6 @@
 """The judge: hand-made true states, and changed copies of a real flight, for each kind of failure."""
 
+import json
 import pickle
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,6 +11,7 @@ import pytest
 from msgspec.structs import replace as with_fields
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from reference import imaged_flight
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
@@ -21,6 +23,7 @@ from rtshcua.virtual.flight_record import (
     Reaction,
     ScenarioFlown,
     SentFrame,
+    TrueImage,
     TruthSample,
 )
 from rtshcua.virtual.judge import SLUGS, Judgement, judge, moves
@@ -631,3 +634,20 @@ def test_readings_are_compared_with_the_truth(signal: str, by: int, words: str) 
 def test_every_slug_has_a_test() -> None:
     text = Path(__file__).read_text(encoding="utf-8")
     assert all(f'"{slug}"' in text for slug in SLUGS)
+
+
+def test_an_image_that_was_never_stored_or_elsewhere_is_untrue(good: ScenarioFlown) -> None:
+    records = [json.loads(line) for line in imaged_flight.flown()]
+    details = [json.loads(each["detail"]) for each in records if each.get("event") == "image"]
+    taken = [each for each in details if each["index"] is not None]
+    stored = tuple(TrueImage(each["utc_us"], each["latitude"], each["longitude"]) for each in taken)
+    lived = replace(good, lives=(replace(good.lives[0], lines=tuple(imaged_flight.flown())),))
+
+    def untrue(*images: TrueImage) -> list[str]:
+        found = judge(replace(lived, images=images)).failures
+        return [each.text for each in found if each.slug == "untrue" and "image" in each.text]
+
+    assert untrue(*stored) == []
+    assert untrue(*stored[:3], *stored[4:]) == [f"image {taken[3]['index']} was recorded and never stored"]
+    elsewhere = stored[3]._replace(latitude=stored[3].latitude + 1)
+    assert untrue(*stored[:3], elsewhere, *stored[4:]) == [f"image {taken[3]['index']} was recorded with another place"]

@@ -14,7 +14,9 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.stdout import out, out_bytes, out_json
-from rtshcua.ground.flight.export import BINARY, FORMATS, PLAN, TLOG
+from rtshcua.ground.flight.export import BINARY, FORMATS, GEOTAG, PLAN, TLOG
+
+_POINTS = {PLAN: "item", TLOG: "frame", GEOTAG: "image"}
 
 app = typer.Typer(add_completion=False)
 
@@ -27,13 +29,18 @@ def export(
         Path | None,
         typer.Option("-o", "--output", help="the file to write [default: RUN.FORMAT, or standard output if piped]"),
     ] = None,
+    images: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="the image files of a geotag export, to find their names")
+    ] = None,
+    tag: Annotated[bool, typer.Option("--tag", help="write the places into these files too, by ExifTool")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="describe the written file as one JSON object")] = False,
 ) -> ExitCode:
     """Write a flight as a file for other programs: the recorded telemetry, with the decisions of the log.
 
     kml, gpx and geojson: track, planned path, zones and decisions, for maps. csv: track, signals and decisions in one
     table. plan: the planned mission for QGroundControl, which needs no telemetry. mcap: everything with its time, for
-    Foxglove and PlotJuggler; requires the extra `export`. tlog: the telemetry up to its last whole frame.
+    Foxglove and PlotJuggler; requires the extra `export`. tlog: the telemetry up to its last whole frame. geotag: the
+    places of the recorded images as `geo.txt` for WebODM, and with `--tag` in the files themselves.
 
     The log is verified with the key store's root. The result is on standard error and in the file, except in tlog. An
     export is never a record: only the log is evidence.
@@ -49,7 +56,7 @@ def export(
         return fail(ExitCode.USAGE, "`--json` and the file cannot both be on standard output", "name a file with `-o`")
     if target is None and to in BINARY and sys.stdout.isatty():
         return fail(ExitCode.USAGE, f"`{to}` is binary, and is not written to a terminal", "name a file with `-o`")
-    made = service.export(ExportRequest(run, to, target))
+    made = service.export(ExportRequest(run, to, target, images, tag))
     if isinstance(made, Refusal):
         return refuse(made)
     for warning in made.warnings:
@@ -61,7 +68,7 @@ def export(
     if as_json:
         out_json(json.dumps(_object(to, target, made), ensure_ascii=False))
     else:
-        points = many(made.points, "item" if to == PLAN else "frame" if to == TLOG else "point")
+        points = many(made.points, _POINTS.get(to, "point"))
         out(f"wrote `{target}`: {points}, {many(len(made.data), 'byte')}", f"  heights  {made.datum}")
     return ExitCode.OK
 

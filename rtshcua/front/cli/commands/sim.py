@@ -50,6 +50,8 @@ Stock = Annotated[
 Parameter = Annotated[
     list[str] | None, typer.Option(metavar="NAME=VALUE", help="set an autopilot parameter (repeatable)")
 ]
+Camera = Annotated[bool, typer.Option("--camera", help="with a camera: on PX4 component 100, else the autopilot's")]
+Gimbal = Annotated[bool, typer.Option("--gimbal", help="with a gimbal that carries the camera: on PX4 component 154")]
 Usb = Annotated[bool, typer.Option("--usb", help="treat the link as USB, where ArduCopter accepts unsigned commands")]
 Release = Annotated[
     str | None,
@@ -79,6 +81,8 @@ def sim(
     estimate: EstimateKind = Estimate.CLOSE,
     signing_key: SigningKey = None,
     stock: Stock = False,
+    camera: Camera = False,
+    gimbal: Gimbal = False,
     parameter: Parameter = None,
     usb: Usb = False,
     release: Release = None,
@@ -107,6 +111,7 @@ def sim(
         words.append(f"--signing-key={signing_key}")
     words += [f"--parameter={each}" for each in parameter or ()]
     words += [*(["--usb"] if usb else []), *(["--stock"] if stock else [])]
+    words += [*(["--camera"] if camera else []), *(["--gimbal"] if gimbal else [])]
     words += [f"--release={release}"] if release is not None else []
     words += [f"--boot={boot}", f"--answers={answers}", f"--estimate={estimate}"]
     try:

@@ -22,8 +22,8 @@ OPTION_GROUPS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     "sim": {
         "The link": ("--port", "--connect", "--usb", "--system", "--signing-key", "--answers"),
         "The vehicle": (
-            "--flavour", "--stock", "--release", "--home", "--battery", "--speed", "--parameter", "--boot",
-            "--estimate",
+            "--flavour", "--stock", "--camera", "--gimbal", "--release", "--home", "--battery", "--speed",
+            "--parameter", "--boot", "--estimate",
         ),
         "Wind and faults": ("--wind", "--fault", "--seed"),
     },

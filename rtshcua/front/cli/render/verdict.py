@@ -27,6 +27,7 @@ MEANINGS = {
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
     "document": "A signed document was forged, or was accepted although it should have been refused.",
     "dispatch": "The vehicle was commanded without an earlier record of the permission.",
+    "image": "The records about images contradict each other: one was added, removed or changed.",
     "preparation": "Autopilot parameters were set differently from their record, or at a forbidden time.",
     "frames": "The raw frames contain a command that is not in the log: it was sent without an earlier record.",
     "anchor": "A witness saw a different log: this one was rewritten or cut by a holder of its keys.",

@@ -42,7 +42,9 @@ from rtshcua.model.scenario import ENDINGS, FLAVOURS, MAX_SEEDS
 OBSTACLE = "obstacle"
 #: the endings as sources write them
 ENDS = tuple(each.replace("-", "_") for each in ENDINGS)
-#: the parts of `start`: the charge, the wind, and the time
+#: equipment of the vehicle, in `start`
+FITTED = ("camera", "gimbal")
+#: the parts of `start` besides: the charge, the wind, and the time
 BATTERY, WIND, AT = "battery", "wind", "at"
 
 
@@ -143,6 +145,8 @@ def _beginning(context: CheckContext, beginning: Beginning) -> None:
         quantity(context, beginning.value, Dimension.RATIO, positive=False, most=10_000)
     elif isinstance(beginning, FaultCall) and name.text == WIND:
         fault_of(context, beginning)
+    elif isinstance(beginning, FaultCall) and name.text in FITTED and not beginning.arguments:
+        pass
     elif isinstance(beginning, FaultCall) and name.text in NAMED and name.text != BATTERY:
         context.report.add(
             codes.BAD_START,
@@ -151,14 +155,14 @@ def _beginning(context: CheckContext, beginning: Beginning) -> None:
             help=f"write `at 0 s {written}`, outside of `start`",
         )
     else:
-        known = (BATTERY, WIND)
+        known = (BATTERY, WIND, *FITTED)
         misspelt = name.text not in known
         context.report.add(
             codes.BAD_START,
             beginning.span,
             f"`{written}` is not allowed in `start`",
             help=(suggestion(name.text, known) if misspelt else None)
-            or "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, or both with a comma",
+            or "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, `start camera(), gimbal()`",
             fix=correction(context.report, name.span, name.text, known) if misspelt else None,
         )
 

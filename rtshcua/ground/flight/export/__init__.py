@@ -2,6 +2,10 @@
 
 from typing import Final
 
-KML, GPX, GEOJSON, CSV, PLAN, MCAP, TLOG = FORMATS = ("kml", "gpx", "geojson", "csv", "plan", "mcap", "tlog")
+KML, GPX, GEOJSON, CSV, PLAN, MCAP, TLOG, GEOTAG = FORMATS = (
+    "kml", "gpx", "geojson", "csv", "plan", "mcap", "tlog", "geotag",
+)  # fmt: skip
+#: how the file of a format ends where it is not its name
+SUFFIXES: Final = {GEOTAG: "txt"}
 #: formats that no terminal shows
 BINARY: Final = frozenset({MCAP, TLOG})

@@ -16,6 +16,7 @@ from rtshcua.app.fly.story import Summary
 from rtshcua.app.telling.record_prose import Names, detail_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.images import ImageDetail, MissingDetail, encoded
 from rtshcua.evidence.reading import read
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.render.live.lines import ending
@@ -298,4 +299,24 @@ def test_times_in_a_log_are_read_in_units_that_people_use() -> None:
     assert detail_of("stalled", "22223836 us") == "22.223836 s"
     assert detail_of("clock", "kernel: UTC is true to 100000 us") == "kernel: UTC is true to 100 ms"
     assert detail_of("clock-stepped", "+1500000 us") == "+1.5 s"
+
+
+def test_images_are_told_in_words() -> None:
+    fields = dict[str, Any](
+        above_home_mm=20_040, above_sea_mm=508_000, asked=2, attitude="camera", camera=100, file="", horizontal_mm=None,
+        index=7, latitude=473_977_400, longitude=85_455_900, pitch_cd=None, result=1, roll_cd=None, series=0, unit=0,
+        utc_us=None, vertical_mm=None, yaw_cd=None,
+    )  # fmt: skip
+    place = "47.3977400, 8.5455900"
+    told = detail_of("image", encoded(ImageDetail(**fields)))
+    assert told == f"camera 100 took image 7 at {place}, 20.0 m above home (requested 2 times)"
+    unknown = {**fields, "latitude": None, "longitude": None, "above_home_mm": None, "asked": 0}
+    assert detail_of("image", encoded(ImageDetail(**unknown))) == "camera 100 took image 7"
+    failed = {**fields, "index": None, "result": 0}
+    assert detail_of("image", encoded(ImageDetail(**failed))) == "camera 100 reports a picture that failed"
+    gaps = MissingDetail(100, 1, 0, 9, ((2, 2), (5, 7)), 4, 0, 6)
+    assert detail_of("images-missing", encoded(gaps)) == (
+        "6 images of camera 100, 4 missing: 2, 5 to 7; 1 picture failed"
+    )
+    assert detail_of("image", "nonsense") == detail_of("images-missing", "{}") == "no record of an image"
     assert detail_of("noted", "22223836 us") == "22223836 us", "what others wrote is left as it is"

@@ -69,6 +69,19 @@ def test_start_is_lowered() -> None:
     assert scenario.scenario.start == Start(battery=8000, wind_mm_s=3000, wind_from_deg=270, gust_mm_s=1000)
 
 
+def test_start_or_a_fault_fits_a_camera_and_a_gimbal() -> None:
+    for body, fitted in (
+        ("", (False, False)),
+        ("start camera()", (True, False)),
+        ("start gimbal(), camera(), battery = 80 %", (True, True)),
+        ("at 3 s camera_loss(part = 10 %)", (True, False)),
+        ("at 3 s camera_reboot(counter = continues)", (True, False)),
+        ("at 3 s gimbal_stuck(for = 5 s)", (True, True)),
+    ):
+        scenario = flown(body).scenario
+        assert (scenario.has_camera, scenario.has_gimbal) == fitted, body
+
+
 MOMENTS: list[tuple[str, When]] = [
     ("at 20 s", AtTime(20 * S, 20 * S)),
     ("at 0 s .. 1 min", AtTime(0, 60 * S)),
@@ -261,6 +274,14 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
     ("start battery = 101 %", "E1003", "`101 %` is too large", "the maximum is 100 %"),
     ("start battery = 8 m", "E0310", "expected a ratio; `8 m` is a length", None),
     ("start kill()", "E1608", "`kill` is not allowed in `start`", "write `at 0 s kill()`, outside of `start`"),
+    ("start camra()", "E1608", "`camra()` is not allowed in `start`", "did you mean `camera`?"),
+    (
+        "start gimbal(for = 3 s)",
+        "E1608",
+        "`gimbal(for = 3 s)` is not allowed in `start`",
+        "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, `start camera(), gimbal()`",
+    ),
+    ("start camera(), camera()", "E1406", "`camera` is given twice", "keep one of them"),
     ("start battery = 8 %, battery = 9 %", "E1406", "`battery` is given twice", "keep one of them"),
     ("at -1 s kill()", "E0319", "`-1 s` must not be negative", None),
     ("at 3 m kill()", "E0310", "expected a duration; `3 m` is a length", None),

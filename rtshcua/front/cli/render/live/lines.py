@@ -118,6 +118,9 @@ def _ending(summary: Summary) -> Iterable[str]:
     yield f"{summary.ending}: {summary.steps_done} of {summary.steps} steps done in {duration(summary.flight_us)}"
     yield f"  decided  {counts}"
     yield from (f"  unseen   {what}: {UNCONFIRMED}" for what in summary.unconfirmed)
+    if summary.images_taken or summary.images_missing or summary.images_failed:
+        failed = f", {many(summary.images_failed, 'picture')} failed" if summary.images_failed else ""
+        yield f"  images   {summary.images_taken} recorded, {summary.images_missing} missing{failed}"
     if summary.may_fly:
         yield f"  vehicle  {summary.may_fly}"
     yield from (f"  battery  {what}" for what in summary.battery)

@@ -1,0 +1,165 @@
+"""The images of a flight, as its log records them, and the names of their files."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, ImageDetail, MissingDetail, read_image, read_missing
+from rtshcua.evidence.records import Effect
+from rtshcua.ground.flight.flown import Flight
+
+#: us: how far the time of a file may be from that of its image: EXIF counts whole seconds, or fractions too
+WHOLE_US: Final = 1_000_000
+FRACTION_US: Final = 300_000
+_NUMBERS: Final = re.compile(r"(\d+)")
+_PLAIN: Final = re.compile(r"[^\s#\x00-\x1f\x7f][^\s\x00-\x1f\x7f]*")
+
+
+class FlightImage(NamedTuple):
+    """An image in a record: its number, its time since the first record, and what the camera reported."""
+
+    seq: int
+    t_us: int
+    detail: ImageDetail
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether its place and its height above the sea are known."""
+        detail = self.detail
+        return None not in (detail.latitude, detail.longitude, detail.above_sea_mm)
+
+
+class FlightImages(NamedTuple):
+    """The images of a flight: those that were taken, in the order of camera, series and index; pictures that failed;
+    and the last list of missing ones for each camera and series.
+    """
+
+    taken: tuple[FlightImage, ...]
+    failed: tuple[FlightImage, ...]
+    missing: tuple[MissingDetail, ...]
+
+    @property
+    def lost(self) -> int:
+        """How many images are missing."""
+        return sum(each.missing for each in self.missing)
+
+
+class NamedImage(NamedTuple):
+    """An image with the name of its file."""
+
+    name: str
+    image: FlightImage
+
+
+def images_of(flight: Flight) -> FlightImages:
+    """The images in the records of a flight; records that make no sense are left out."""
+    taken, failed = list[FlightImage](), list[FlightImage]()
+    missing: dict[tuple[int, int], MissingDetail] = {}
+    for record in flight.records:
+        if not isinstance(record, Effect):
+            continue
+        if record.event == IMAGE and (detail := read_image(record.detail)) is not None:
+            found = FlightImage(record.seq, flight.since_begun(record), detail)
+            (failed if detail.index is None else taken).append(found)
+        elif record.event == IMAGES_MISSING and (told := read_missing(record.detail)) is not None:
+            missing[told.camera, told.series] = told
+    return FlightImages(tuple(sorted(taken, key=_order)), tuple(failed), tuple(missing.values()))
+
+
+def _order(image: FlightImage) -> tuple[int, int, int]:
+    return image.detail.camera, image.detail.series, image.detail.index or 0
+
+
+def natural(name: str) -> tuple[object, ...]:
+    """A key that sorts `IMG_9` before `IMG_10`."""
+    return tuple((1, int(part), "") if part.isdecimal() else (0, 0, part) for part in _NUMBERS.split(name))
+
+
+def named(
+    images: Sequence[FlightImage], files: Sequence[str] | None, times_us: Mapping[str, int]
+) -> tuple[tuple[NamedImage, ...], str] | Refusal:
+    """Each image with its file, and how they were matched, in words. `files` are the names in the folder, None without
+    one; `times_us` are their times where known, by a clock that may be any other.
+
+    A file belongs to the image that has its name in the record; where names are not recorded, to the one at the same
+    place in the order, if there are as many; else to that of the same time, if only one offset between the clocks fits.
+    """
+    told = [each.detail.file for each in images]
+    whole = all(told) and len(set(told)) == len(told)
+    if files is None:
+        return _checked(images, told, "by their recorded names") if whole else _UNNAMED
+    present = sorted(files, key=natural)
+    if whole and set(told) & set(present):
+        kept = [each for each in images if each.detail.file in set(present)]
+        return _checked(kept, [each.detail.file for each in kept], "by their recorded names")
+    if len({each.detail.camera for each in images}) > 1:
+        return Refusal(
+            "no-match", "the log has images of several cameras, without their file names", _ADD, ExitCode.INPUT
+        )
+    if len(present) == len(images):
+        return _checked(images, present, "by their order")
+    dated = {name: times_us[name] for name in present if name in times_us}
+    matched = _by_time(images, dated) if len(dated) == len(present) else None
+    if matched is not None:
+        return _checked([image for _, image in matched], [name for name, _ in matched], "by their times")
+    count = f"the folder has {_many(present)} and the log {_many(images)}"
+    return Refusal("no-match", f"{count}, and neither names nor times tell which belong together", _ADD, ExitCode.INPUT)
+
+
+def _many(images: Sequence[object]) -> str:
+    return f"{len(images)} image{'' if len(images) == 1 else 's'}"
+
+
+_UNNAMED: Final = Refusal(
+    "no-file-names",
+    "the log does not name the files of its images",
+    "name their folder with `--images`",
+    ExitCode.INPUT,
+)
+_ADD: Final = "copy all images of the flight into the folder, and no others"
+
+
+def _checked(
+    images: Sequence[FlightImage], names: Sequence[str], how: str
+) -> tuple[tuple[NamedImage, ...], str] | Refusal:
+    odd = next((each for each in names if not _PLAIN.fullmatch(each)), None)
+    if odd is not None:
+        return Refusal(
+            "odd-name",
+            f"`{odd}` has a space, or begins with `#`: readers would misread it",
+            "rename it",
+            ExitCode.INPUT,
+        )
+    return tuple(NamedImage(name, image) for name, image in zip(names, images, strict=True)), how
+
+
+def _by_time(
+    images: Sequence[FlightImage], times_us: Mapping[str, int]
+) -> list[tuple[str, FlightImage]] | None:  # fmt: skip
+    """Match by time, with one unknown offset between the clocks; None if none fits, or several do."""
+    dated = sorted((each for each in images if each.detail.utc_us), key=lambda each: each.detail.utc_us or 0)
+    files = sorted(times_us, key=lambda name: (times_us[name], natural(name)))
+    if not dated or not files:
+        return None
+    within_us = FRACTION_US if any(each % WHOLE_US for each in times_us.values()) else WHOLE_US
+    best = dict[int, list[tuple[str, FlightImage]]]()
+    for image in dated:
+        offset = times_us[files[0]] - (image.detail.utc_us or 0)
+        best[offset] = list(_pairs(dated, files, times_us, offset, within_us))
+    most = max(map(len, best.values()))
+    fitting = [offset for offset, pairs in best.items() if len(pairs) == most]
+    return best[fitting[0]] if len(fitting) == 1 and most == len(files) else None
+
+
+def _pairs(
+    dated: Sequence[FlightImage], files: Sequence[str], times_us: Mapping[str, int], offset: int, within_us: int
+) -> Iterator[tuple[str, FlightImage]]:
+    at = 0
+    for name in files:
+        while at < len(dated) and (dated[at].detail.utc_us or 0) + offset < times_us[name] - within_us:
+            at += 1
+        if at < len(dated) and abs((dated[at].detail.utc_us or 0) + offset - times_us[name]) <= within_us:
+            yield name, dated[at]
+            at += 1

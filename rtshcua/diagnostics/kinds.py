@@ -26,9 +26,7 @@ DOCUMENT: Final = FileKind("a signed document", "`rtshcua show` prints it")
 KEY: Final = FileKind("a key", "`rtshcua show` names its duty; keep a private key secret")
 SPECIFICATION: Final = FileKind("a mission specification", "`rtshcua compile FILE.json --with POLICY.rts` compiles it")
 SOURCE: Final = FileKind("a source", "`rtshcua compile FILE.rts -o FILE.bundle` makes a bundle of it")
-PLAN: Final = FileKind(
-    "a QGroundControl plan", "plans are not supported: write the mission as a source, its fence and zones as `zone`"
-)
+PLAN: Final = FileKind("a QGroundControl plan", "`rtshcua import FILE.plan -o FILE.rts` makes a source of it")
 WAYPOINTS: Final = FileKind(
     "a list of waypoints (QGC WPL)", "waypoint lists are not supported: write the mission as a source"
 )

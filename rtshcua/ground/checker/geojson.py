@@ -364,7 +364,22 @@ def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
     return _polygons(geometry, pointer)
 
 
+def polygon_of(rings: Sequence[Any], pointer: str) -> GeoPolygon:
+    """A polygon from its rings as in a file, of positions whose values are `Number`; raises `NoArea`."""
+    return _polygon(rings, pointer)
+
+
 # ------------------------------------------------------------------------------------------------------------ JSON
+
+
+def read_json(data: bytes) -> Any:
+    """Parse the JSON of a file with the same limits and the same strictness as an area; numbers are `Number`. Raises
+    `NoArea`.
+    """
+    tree = _json(data)
+    if _positions(tree) > MAX_VALUES:
+        raise _not_json(f"it has more than {MAX_VALUES} positions: remove the features that are not needed")
+    return _all_laid_out(tree)
 
 
 def _json(data: bytes) -> Any:
@@ -538,6 +553,26 @@ def _laid_out(value: Any) -> Any:
         else:
             made.append(_laid_out(each))
     return made
+
+
+def _positions(tree: Any) -> int:
+    """The number of positions anywhere in a tree."""
+    return sum(map(_positions, tree.values())) if isinstance(tree, dict) else _listed_positions(tree)
+
+
+def _listed_positions(tree: Any) -> int:
+    if isinstance(tree, Run):
+        return tree.count()
+    return sum(map(_positions, tree)) if isinstance(tree, list) else 0
+
+
+def _all_laid_out(tree: Any) -> Any:
+    """A tree with the runs of all its lists parsed."""
+    if isinstance(tree, dict):
+        return {name: _all_laid_out(each) for name, each in tree.items()}
+    if not isinstance(tree, list):
+        return _laid_out(tree)
+    return [_all_laid_out(each) if isinstance(each, dict | list) else each for each in _laid_out(tree)]
 
 
 def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:

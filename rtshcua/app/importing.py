@@ -1,7 +1,9 @@
 """The service `import`: a file of the trade as a source of the language, with everything that it leaves out."""
 
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -13,15 +15,20 @@ from rtshcua.app.propose import Missions, NoPolicy
 from rtshcua.decision.prepare import prepare
 from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.diagnostics.kinds import PLAN, recognised
+from rtshcua.diagnostics.kinds import ARCHIVE, ED269, GEOJSON, KML, PLAN, recognised
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import listed, nearest
+from rtshcua.ground.checker.geojson import NoArea, read_json
+from rtshcua.ground.exchange.geojson_features import features_of, is_ed269, is_ed318, is_point, read_feature, read_point
+from rtshcua.ground.exchange.kml_document import kml_of, read_kml
+from rtshcua.ground.exchange.kml_zones import zones_of_kml
 from rtshcua.ground.exchange.losses import LOSSES, Loss, NotKept, NotReadable, comment, grouped, left_out
 from rtshcua.ground.exchange.plan_source import MissionHeader, draft_policy, fence_zones, mission_text
 from rtshcua.ground.exchange.plan_steps import StepTable, plan_steps
 from rtshcua.ground.exchange.qgc_reading import QgcPlan, read_plan_file
 from rtshcua.ground.exchange.stock_policy import VEHICLE, GeoPoint
+from rtshcua.ground.exchange.zone_features import INSIDE, OUTSIDE, ZoneFeature, ZoneTerms, write_zones
 from rtshcua.ground.exchange.zone_source import SourceNames, place_text
 from rtshcua.ground.format.format_text import format_text
 from rtshcua.ground.gateway.accepted import accepted_commands
@@ -32,16 +39,25 @@ from rtshcua.mavlink import dialect
 ZONES, MISSION = "zones", "mission"
 TARGETS: Final = (ZONES, MISSION)
 PROPOSERS: Final = ("operator", "agent")
+#: what plain areas are for
+USES: Final = (OUTSIDE, INSIDE)
+#: the packages of the extra `import`
+_EXTRA: Final = ("uas_standards", "implicitdict")
 #: the name of a source that is not written to a file
 _UNNAMED: Final = "imported.rts"
-_SUFFIXES: Final = (".plan",)
+SUFFIXES: Final = (".plan", ".kml", ".kmz", ".geojson", ".json")
+_TERRAIN: Final = re.compile(r"(-?[0-9]{1,4}(?:\.[0-9]{1,3})?)\.\.(-?[0-9]{1,4}(?:\.[0-9]{1,3})?)")
+_CLOCK: Final = re.compile(r"utc|(?:utc ?)?([+-])([01]?[0-9]):([0-5][0-9])")
+_WIDTH: Final = re.compile(r"([1-9][0-9]{0,4}(?:\.[0-9]{1,3})?)(?: ?m)?")
 #: how many places of one loss, and how many parts that are not kept, are printed
 _MOST_PLACES, _MOST_TOLD = 3, 20
 
 
 class ImportRequest(NamedTuple):
     """A file, what is made of it (empty: what its kind usually is), the source to write (None: none), the source with
-    the policy of a mission, what is left out, and who proposes a mission.
+    the policy of a mission, what is left out, and who proposes a mission. Of zones: what plain areas are for, the
+    lowest and the highest ground (`400..460`, in m above sea), the offset of the vehicle's clock (`+02:00`), and the
+    width of lines in m; empty where nothing is stated.
     """
 
     file: Path
@@ -50,6 +66,10 @@ class ImportRequest(NamedTuple):
     policy: Path | None = None
     skip: Sequence[str] = ()
     proposer: str = "operator"
+    use: str = OUTSIDE
+    terrain: str = ""
+    clock: str = ""
+    width: str = ""
 
 
 class ImportedSource(NamedTuple):
@@ -65,6 +85,7 @@ class ImportedSource(NamedTuple):
     losses: tuple[Loss, ...]
     not_kept: tuple[NotKept, ...]
     left_out: tuple[NotKept, ...]
+    rules: tuple[str, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
     sources: Mapping[str, Source] = {}
 
@@ -95,6 +116,7 @@ class ImportedSource(NamedTuple):
             "to": self.to,
             "zones": self.zones,
             "steps": self.steps,
+            "rules": list(self.rules),
             "losses": [each._asdict() | {"consequence": LOSSES[each.name]} for each in self.losses],
             "left_out": [each._asdict() for each in self.left_out],
             "not_kept": [each._asdict() for each in self.not_kept],
@@ -117,6 +139,7 @@ class _Made(NamedTuple):
     steps: int
     losses: tuple[Loss, ...]
     not_kept: tuple[NotKept, ...]
+    rules: tuple[str, ...] = ()
 
 
 def import_file(request: ImportRequest) -> ImportedSource | Refusal:
@@ -130,19 +153,65 @@ def import_file(request: ImportRequest) -> ImportedSource | Refusal:
         return Refusal("input", f"cannot read `{request.file}`: {words_of(error)}", "", ExitCode.INPUT)
     if len(data) > MAX_SIZE:
         return _unread(request, f"it has more than {MAX_SIZE >> 20} MiB", "remove the parts that are not needed")
-    kind = recognised(data)
+    terms = _terms(request)
+    if isinstance(terms, Refusal):
+        return terms
     try:
-        if kind is PLAN or (kind is None and request.file.suffix.lower() == ".plan"):
-            return _imported_plan(request, read_plan_file(data))
+        return _by_kind(request, terms, data)
     except NotReadable as error:
         return _unread(request, str(error), error.help)
+
+
+def _by_kind(request: ImportRequest, terms: ZoneTerms, data: bytes) -> ImportedSource | Refusal:
+    """Import a file of any kind. Raises `NotReadable`."""
+    kind, suffix = recognised(data), request.file.suffix.lower()
+    if kind is PLAN or (kind is None and suffix == ".plan"):
+        return _imported_plan(request, read_plan_file(data))
+    if request.to == MISSION:
+        return _unread(request, "only a plan becomes a mission", "`--to zones` imports areas")
+    if kind is ARCHIVE or (kind is None and suffix == ".kmz"):
+        data, kind = kml_of(data), KML
+    if kind is KML or (kind is None and suffix == ".kml"):
+        found = zones_of_kml(read_kml(data), terms.width, request.use)
+        return _imported_zones(request, terms, "kml", found.features, found.losses, found.not_kept)
+    if kind in (GEOJSON, ED269) or (kind is None and suffix in (".json", ".geojson")):
+        return _imported_json(request, terms, data)
     name = "no file that can be imported" if kind is None else kind.name
-    return _unread(request, f"it is {name}", f"imported are {listed(_SUFFIXES)}")
+    return _unread(request, f"it is {name}", f"imported are {listed(SUFFIXES)}")
+
+
+def _terms(request: ImportRequest) -> ZoneTerms | Refusal:
+    """What is stated about the site."""
+    terrain = _TERRAIN.fullmatch(request.terrain)
+    clock = _CLOCK.fullmatch(request.clock)
+    width = _WIDTH.fullmatch(request.width)
+    for word, found, option, example in (
+        (request.terrain, terrain, "--terrain", "400..460"),
+        (request.clock, clock, "--clock", "+02:00"),
+        (request.width, width, "--width", "20"),
+    ):
+        if word and found is None:
+            return Refusal("usage", f"`{word}` is not accepted by `{option}`", f"as in `{option} {example}`")
+    ground = None if terrain is None else (_mm(terrain[1]), _mm(terrain[2]))
+    if ground is not None and ground[0] > ground[1]:
+        return Refusal("usage", f"`--terrain {request.terrain}`: the lowest ground comes first")
+    offset = None
+    if clock is not None:
+        offset = (int(clock[2] or 0) * 60 + int(clock[3] or 0)) * (-1 if clock[1] == "-" else 1)
+    return ZoneTerms(ground, offset, None if width is None else _mm(width[1]))
+
+
+def _mm(metres: str) -> int:
+    return round(Decimal(metres) * 1000)
 
 
 def _unfit(request: ImportRequest) -> Refusal | None:
     """Why the command line cannot be followed."""
-    for word, known, option in ((request.to, ("", *TARGETS), "--to"), (request.proposer, PROPOSERS, "--proposer")):
+    for word, known, option in (
+        (request.to, ("", *TARGETS), "--to"),
+        (request.proposer, PROPOSERS, "--proposer"),
+        (request.use, USES, "--as"),
+    ):
         if word not in known:
             near = nearest(word, known)
             help = f"did you mean `{near}`?" if near else f"accepted: {listed([each for each in known if each])}"
@@ -183,8 +252,8 @@ def _finished(request: ImportRequest, kind: str, to: str, made: _Made | Refusal)
     checked = read_text(name, text)
     found = examine(checked)
     return ImportedSource(
-        kind, to, text, made.zones, made.steps, made.losses, (), tuple(skipped), found.diagnostics,
-        checked.program.sources,
+        kind, to, text, made.zones, made.steps, made.losses, (), tuple(skipped), made.rules,
+        found.diagnostics, checked.program.sources,
     )  # fmt: skip
 
 
@@ -208,9 +277,10 @@ def _plan_zones(request: ImportRequest, plan: QgcPlan) -> _Made | Refusal:
     if not fence.zones and not not_kept:
         return _unread(request, "it has no fence to make zones of", "`--to mission` imports its items")
     lost = tuple(each for each in plan.losses if each.place.startswith("/geoFence"))
-    told = f"// For a policy: {fence.airspace()}\n" if fence.airspace() else ""
+    rules = (fence.airspace(),) if fence.airspace() else ()
+    told = "".join(f"// For a policy: {rule}\n" for rule in rules)
     text = "\n".join([_introduction(request) + told, *(each.text() for each in fence.zones)])
-    return _Made(text, len(fence.zones), 0, lost, not_kept)
+    return _Made(text, len(fence.zones), 0, lost, not_kept, rules)
 
 
 def _plan_mission(request: ImportRequest, plan: QgcPlan) -> _Made | Refusal:
@@ -288,3 +358,57 @@ def _table(missions: Missions) -> StepTable:
         (projection.latitude, projection.longitude),
         None if elevation is None else elevation.value,
     )
+
+
+# ---------------------------------------------------------------- zones
+
+
+def _imported_json(request: ImportRequest, terms: ZoneTerms, data: bytes) -> ImportedSource | Refusal:
+    """The zones of a file of ED-269, or of the features of GeoJSON."""
+    try:
+        tree = read_json(data)
+    except NoArea as error:
+        raise NotReadable(error.message, error.help or "") from None
+    try:
+        if isinstance(tree, dict | list) and is_ed269(tree):
+            from rtshcua.ground.exchange.geographical_zones import read_ed269
+
+            return _imported_zones(request, terms, "ed-269", read_ed269(tree), (), ())
+        features = features_of(tree)
+        found: list[ZoneFeature] = []
+        losses: list[Loss] = []
+        kind = "geojson"
+        for place, each in features:
+            if is_ed318(each):
+                from rtshcua.ground.exchange.geographical_zones import read_ed318
+
+                kind = "ed-318"
+                found += read_ed318(each, place)
+            elif not is_point(each):
+                found.append(read_feature(each, place, terms.width, request.use))
+            elif isinstance(point := read_point(each, place), Loss):
+                losses.append(point)
+            else:
+                found.append(point)
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in _EXTRA:
+            raise
+        help = "run `pip install '.[import]'` in the checkout"
+        return Refusal("input", f"the package `{error.name}` is required and not installed", help)
+    return _imported_zones(request, terms, kind, found, losses, ())
+
+
+def _imported_zones(
+    request: ImportRequest, terms: ZoneTerms, kind: str, features: Sequence[ZoneFeature],
+    losses: Sequence[Loss], not_kept: Sequence[NotKept],
+) -> ImportedSource | Refusal:  # fmt: skip
+    written = write_zones(features, terms, SourceNames())
+    if not features and not not_kept:
+        return _unread(request, "it has no area")
+    told = "".join(f"// For a policy: {rule}\n" for rule in written.rules)
+    text = "\n".join([_introduction(request) + told, *(each.text() for each in written.zones)])
+    refused = (*not_kept, *written.not_kept)
+    if not written.zones and not left_out(refused, request.skip)[0]:
+        return _unread(request, "nothing of it is left")
+    made = _Made(text, len(written.zones), 0, (*losses, *written.losses), refused, written.rules)
+    return _finished(request, kind, ZONES, made)

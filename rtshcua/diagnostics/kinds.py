@@ -33,9 +33,9 @@ WAYPOINTS: Final = FileKind(
 GEOJSON: Final = FileKind("GeoJSON", 'read it from a source: `zone NAME from "FILE.geojson"`')
 ED269: Final = FileKind(
     "a list of geographical zones (ED-269)",
-    "ED-269 is not supported: write each zone with its heights and times as `zone`",
+    "`rtshcua import FILE -o FILE.rts` makes zones of it",
 )
-KML: Final = FileKind("KML", 'convert it to GeoJSON and read it from a source: `zone NAME from "FILE.geojson"`')
+KML: Final = FileKind("KML", "`rtshcua import FILE.kml -o FILE.rts` makes zones of it")
 ARCHIVE: Final = FileKind("a ZIP archive", "extract the file that you need")
 PDF: Final = FileKind("a PDF document", "")
 HTML: Final = FileKind("a web page", "")

@@ -60,7 +60,7 @@ COMMANDS = (
     Row(
         "import",
         "write",
-        "turn plans of QGroundControl into sources; every loss is named",
+        "turn plans, KML, GeoJSON and official zones into sources",
         reports=True,
         file="import_file",
     ),

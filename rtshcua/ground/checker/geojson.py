@@ -180,7 +180,7 @@ def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
             "it is JSON, but not a GeoJSON object",
             'a GeoJSON object has a `"type"`, such as `"FeatureCollection"` (RFC 7946, 3)',
         )
-    _reference_system(tree)
+    reference_system(tree)
     if kind == "FeatureCollection":
         return _among(tree, feature)
     if kind == "Feature":
@@ -221,7 +221,7 @@ def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], s
 
 def _geometry(feature: dict[str, Any], pointer: str) -> tuple[dict[str, Any], str]:
     """RFC 7946, 3.2: the geometry of a Feature is a geometry object, or null without a place."""
-    _reference_system(feature)
+    reference_system(feature)
     refuse_unread(feature, pointer)
     geometry = feature.get("geometry")
     if geometry is None:
@@ -240,7 +240,7 @@ def _area(geometry: Any, pointer: str) -> tuple[dict[str, Any], str]:
             "a zone is read from a Polygon or a MultiPolygon",
         )
     assert isinstance(geometry, dict)
-    _reference_system(geometry)
+    reference_system(geometry)
     return geometry, pointer
 
 
@@ -277,8 +277,10 @@ def _known(features: list[dict[str, Any]], wanted: str | None = None) -> str | N
     return "select one with `feature`: " + ", ".join(f"`{name}`" for name in names[:MOST_NAMED]) + more
 
 
-def _reference_system(tree: dict[str, Any]) -> None:
-    """RFC 7946, 4: all positions are WGS 84. A `crs` of an older file must be the same (GeoJSON 2008, 3)."""
+def reference_system(tree: dict[str, Any]) -> None:
+    """Raise `NoArea` if an object names another reference system than WGS 84. RFC 7946, 4: all positions are WGS 84. A
+    `crs` of an older file must be the same (GeoJSON 2008, 3).
+    """
     crs = tree.get("crs")
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None

@@ -2,7 +2,7 @@
 where the vehicle flies nor where a zone is. What would change that is *not kept*: the import is refused, unless a
 person leaves that part out by its name.
 
-Names of losses are stable. Places are JSON pointers (RFC 6901).
+Names of losses are stable. Places are JSON pointers (RFC 6901), or elements of a KML document.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,6 +38,16 @@ LOSSES: Final[Mapping[str, str]] = MappingProxyType(
         "vertical-speed": "the vehicle climbs and descends with its own speeds",
         "vtol": "there is no transition: the steps are for a multicopter",
         "yaw": "the heading is the autopilot's choice",
+        # of zones
+        "authority": "the import knows no authorisation: the zone is excluded, also for those who have one",
+        "conditions": "the conditions are a comment; the zone is excluded whether they are met or not",
+        "description": "texts and other data are not kept",
+        "no-height": "the file gives no height: the zone reaches from the ground to any height",
+        "point": "a point is no area",
+        "style": "colours, icons, views and overlays are not kept",
+        "time-stamp": "the zone is not limited to this moment",
+        "track": "a flown track is no area",
+        "widened": "a height above ground is written above sea, on the safe side of the stated terrain",
     }
 )
 

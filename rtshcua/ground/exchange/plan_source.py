@@ -10,7 +10,7 @@ from math import isqrt
 from typing import Final, NamedTuple
 
 from rtshcua.ground.exchange.losses import Loss, comment
-from rtshcua.ground.exchange.plan_steps import PlannedStep, flying_items
+from rtshcua.ground.exchange.plan_steps import ImportedStep, flying_items
 from rtshcua.ground.exchange.qgc_reading import QgcFence, QgcItem, QgcPlan, degrees_e7
 from rtshcua.ground.exchange.stock_policy import (
     CLIMB,
@@ -215,7 +215,7 @@ class MissionHeader(NamedTuple):
     origin: str
 
 
-def mission_text(header: MissionHeader, steps: Sequence[PlannedStep]) -> str:
+def mission_text(header: MissionHeader, steps: Sequence[ImportedStep]) -> str:
     """The mission, in three phases: up to the first climb, the work, and the return or landing at the end."""
     first = next((at for at, each in enumerate(steps) if each.step.skill == "takeoff"), -1) + 1
     last = len(steps)
@@ -234,7 +234,7 @@ def mission_text(header: MissionHeader, steps: Sequence[PlannedStep]) -> str:
     return "\n".join([*lines, "}", ""])
 
 
-def step_text(planned: PlannedStep) -> str:
+def step_text(planned: ImportedStep) -> str:
     """A step as a call with named arguments."""
     arguments = ", ".join(f"{name} = {text}" for name, text in planned.step.arguments.items())
     return f"{planned.step.skill}({arguments})"

@@ -96,22 +96,22 @@ class StepTable(NamedTuple):
     above_sea: int | None
 
 
-class PlannedStep(NamedTuple):
+class ImportedStep(NamedTuple):
     """A step, and the place of its item in the file."""
 
     step: ProposedStep
     place: str
 
 
-class PlannedSteps(NamedTuple):
+class ImportedSteps(NamedTuple):
     """The steps of a plan with its losses, and what is not kept."""
 
-    steps: tuple[PlannedStep, ...]
+    steps: tuple[ImportedStep, ...]
     losses: tuple[Loss, ...]
     not_kept: tuple[NotKept, ...]
 
 
-def plan_steps(plan: QgcPlan, table: StepTable, without: Iterable[str] = ()) -> PlannedSteps:
+def plan_steps(plan: QgcPlan, table: StepTable, without: Iterable[str] = ()) -> ImportedSteps:
     """Translate the items of a plan, without those at the places `without`."""
     return _Translating(plan, table).steps(frozenset(without))
 
@@ -139,6 +139,11 @@ def _losses(item: QgcItem, *, reads_yaw: bool) -> Iterator[Loss]:
         return
     if item.params[3] is not None and reads_yaw:
         yield Loss("yaw", item.place, f"{item.params[3]:f} deg")
+    yield from _losses_of_options(item)
+
+
+def _losses_of_options(item: QgcItem) -> Iterator[Loss]:
+    """The losses of an item that flies, by its other parameters."""
     if item.command == WAYPOINT and (item.params[1] or item.params[2]):
         yield Loss("acceptance-radius", item.place, f"{item.params[1] or item.params[2]} m")
     if item.command in (_LAND, _VTOL_LAND) and (item.params[0] or item.params[1]):
@@ -170,7 +175,7 @@ class _Translating:
         self._losses = list(item_losses(plan))
         self._not_kept: list[NotKept] = []
 
-    def steps(self, without: frozenset[str]) -> PlannedSteps:
+    def steps(self, without: frozenset[str]) -> ImportedSteps:
         for item in self._plan.items:
             if item.place in without:
                 continue
@@ -181,7 +186,7 @@ class _Translating:
                 self._not_kept.append(NotKept(command_name(item.command), item.place, *why))
         self._take_off()
         found = tuple(self._without_still_flights())
-        return PlannedSteps(found, tuple(self._losses), tuple(self._not_kept))
+        return ImportedSteps(found, tuple(self._losses), tuple(self._not_kept))
 
     def _refusal(self, item: QgcItem) -> tuple[str, str] | None:
         """Why an item is not kept, before anything is asked of the policy; and a help."""
@@ -274,7 +279,7 @@ class _Translating:
             self._places.insert(0, self._places[0])
             self._losses.append(Loss("added-takeoff", self._places[0], "the first item flies"))
 
-    def _without_still_flights(self) -> Iterator[PlannedStep]:
+    def _without_still_flights(self) -> Iterator[ImportedStep]:
         """The steps without flights to the place and the height where the vehicle is already."""
         at, height = self._home_text, 0
         for step, place in zip(self._made.steps, self._places, strict=True):
@@ -290,7 +295,7 @@ class _Translating:
                 at, height = self._home_text, 0
             elif motion.kind == MotionKind.LAND:
                 height = 0
-            yield PlannedStep(step, place)
+            yield ImportedStep(step, place)
 
     @property
     def _home_text(self) -> str:

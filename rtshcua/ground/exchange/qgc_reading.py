@@ -143,8 +143,8 @@ class _Reading:
 
     def _complex(self, item: dict[str, Any], place: str) -> Iterator[QgcItem]:
         kind = item.get("complexItemType")
-        if not isinstance(kind, str):
-            raise NotReadable(f"`{place}/complexItemType` is not a text")
+        if not isinstance(kind, str) or not kind.strip():
+            raise NotReadable(f"`{place}/complexItemType` is not a name")
         legs = item.get("TransectStyleComplexItem")
         made = legs.get("Items") if isinstance(legs, dict) else None
         if kind not in _TRANSECTS or not made:

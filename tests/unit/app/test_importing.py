@@ -28,7 +28,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.exchange.losses import LOSSES
 from rtshcua.ground.exchange.plan_source import step_text
-from rtshcua.ground.exchange.plan_steps import PlannedSteps, StepTable, plan_steps
+from rtshcua.ground.exchange.plan_steps import ImportedSteps, StepTable, plan_steps
 from rtshcua.ground.exchange.qgc_reading import read_plan_file
 from rtshcua.ground.exchange.zone_source import SourceNames
 from rtshcua.ground.format.format_text import format_text
@@ -125,13 +125,13 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> StepTable:
     return policy.table
 
 
-def translated(table: StepTable, *items: dict[str, Any], without: tuple[str, ...] = ()) -> PlannedSteps:
+def translated(table: StepTable, *items: dict[str, Any], without: tuple[str, ...] = ()) -> ImportedSteps:
     """The steps of items between a take-off and a return, without these two."""
     read = read_plan_file(json.dumps(plan(TAKEOFF, *items, RETURN)).encode())
     found = plan_steps(read, table, (*without, *(each.place for each in read.not_kept)))
     assert [each.step.skill for each in (found.steps[0], found.steps[-1])] == ["takeoff", "return_home"]
     losses = (*read.losses, *found.losses)
-    return PlannedSteps(found.steps[1:-1], losses, (*read.not_kept, *found.not_kept))
+    return ImportedSteps(found.steps[1:-1], losses, (*read.not_kept, *found.not_kept))
 
 
 def test_each_item_has_its_meaning(table: StepTable) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from rtshcua.app import importing as service
-from rtshcua.app.importing import PROPOSERS, TARGETS, ImportedSource, ImportRequest
+from rtshcua.app.importing import PROPOSERS, TARGETS, USES, ImportedSource, ImportRequest
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -19,7 +19,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command("import")
 def import_file(
-    file: Annotated[Path, typer.Argument(help="a plan of QGroundControl (.plan)")],
+    file: Annotated[Path, typer.Argument(help="a plan (.plan), KML, KMZ, GeoJSON, ED-269 or ED-318")],
     to: Annotated[
         str, typer.Option("--to", metavar="TARGET", help=f"one of {', '.join(TARGETS)} [default: by the file]")
     ] = "",
@@ -33,9 +33,18 @@ def import_file(
         list[str] | None, typer.Option(help="leave out a part that is not kept: its name or place, or `all`")
     ] = None,
     proposer: Annotated[str, typer.Option(help=f"who proposes a mission: {' or '.join(PROPOSERS)}")] = PROPOSERS[0],
+    use: Annotated[
+        str, typer.Option("--as", metavar="USE", help=f"what plain areas are for: {' or '.join(USES)}")
+    ] = USES[0],
+    terrain: Annotated[
+        str, typer.Option(metavar="LOW..HIGH", help="the lowest and the highest ground of the site, in m above sea")
+    ] = "",
+    clock: Annotated[str, typer.Option(metavar="OFFSET", help="the fixed offset of the vehicle's clock: +02:00")] = "",
+    width: Annotated[str, typer.Option(metavar="METRES", help="the width of the corridors along lines, in m")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Turn a plan of QGroundControl into a source: a mission, or the zones of its fence (docs/import.md).
+    """Turn a plan of QGroundControl into a source with its mission or fence, and KML, GeoJSON or official zones into
+    zones (docs/import.md).
 
     Each loss is named, with its place in the file and its consequence. A part that cannot be kept, because it would
     change where the vehicle flies or where a zone is, is an error; nothing is written unless `--skip` leaves it out.
@@ -45,7 +54,8 @@ def import_file(
     written; 2 wrong command line; 3 the file is missing, malformed or too large.
     """
     findings = Findings(json=as_json)
-    found = service.import_file(ImportRequest(file, to, output, policy, tuple(skip or ()), proposer))
+    request = ImportRequest(file, to, output, policy, tuple(skip or ()), proposer, use, terrain, clock, width)
+    found = service.import_file(request)
     if isinstance(found, Refusal):
         return findings.end(found)
     if not as_json:

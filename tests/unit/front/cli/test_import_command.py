@@ -1,12 +1,15 @@
 """`rtshcua import`: what is printed and written, refusals, JSON and exit codes."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from reference.qgc_plans import RETURN, TAKEOFF, at, circle, fence, plan, simple, write
+from reference.zone_files import ed269, kml, mark, polygon
+from reference.zone_files import write as zone_file
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 
@@ -101,3 +104,33 @@ def test_wrong_command_lines(words: list[str], code: ExitCode, capsys: pytest.Ca
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.startswith("error")
+
+
+def test_zones_with_what_the_site_states(capsys: pytest.CaptureFixture[str]) -> None:
+    zone_file(Path(), kml(mark(polygon(",120", "relativeToGround", extrude=True))), "site.kml")
+    assert app.main(["import", "site.kml", "-o", "site.rts"]) == ExitCode.DIAGNOSTICS
+    said = " ".join(capsys.readouterr().err.split())
+    assert "error: Quarry at Placemark[1]: its height is above ground" in said
+    assert "help: state the lowest and the highest ground of the site: `--terrain LOW..HIGH`" in said
+    words = ["import", "site.kml", "-o", "site.rts", "--terrain", "400..460", "--as", "inside", "--json"]
+    assert app.main(words) == ExitCode.OK
+    found = json.loads(capsys.readouterr().out)
+    assert (found["kind"], found["to"], found["zones"], found["rules"]) == (
+        "kml",
+        "zones",
+        1,
+        ["airspace inside quarry"],
+    )
+    assert "ceiling 520 m above sea" in Path("site.rts").read_text(encoding="utf-8")
+    assert app.main(["check", "site.rts"]) == ExitCode.OK
+
+
+def test_the_extra_is_named_if_it_is_not_installed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(sys.modules, "rtshcua.ground.exchange.geographical_zones", raising=False)
+    monkeypatch.setitem(sys.modules, "uas_standards", None)
+    monkeypatch.setitem(sys.modules, "implicitdict", None)
+    zone_file(Path(), ed269(), "zones.json")
+    assert app.main(["import", "zones.json"]) == ExitCode.INPUT
+    assert "pip install '.[import]'" in capsys.readouterr().err

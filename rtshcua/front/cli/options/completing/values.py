@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from rtshcua.app.importing import PROPOSERS, TARGETS
+from rtshcua.app.importing import PROPOSERS, SUFFIXES, TARGETS, USES
 from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.front.cli.table import COMMANDS
@@ -36,13 +36,13 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "logs": _LOGS,
     "anchors": ("*.anchors",),
     "export run": _LOGS,
-    "import file": ("*.plan",),
+    "import file": tuple(f"*{each}" for each in SUFFIXES),
     "import policy": _SOURCES,
     "why path": ("*.rts", "*.json", "*.bundle", "*.jsonl"),
 }
 
 #: the values of parameters of `import`
-IMPORTED: Final = {"to": TARGETS, "proposer": PROPOSERS}
+IMPORTED: Final = {"to": TARGETS, "proposer": PROPOSERS, "use": USES}
 
 #: parameters that take folders
 FOLDERS: Final = frozenset({"directory", "folder", "runs", "save", "state_dir", "archive"})

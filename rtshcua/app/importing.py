@@ -20,7 +20,15 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import listed, nearest
 from rtshcua.ground.checker.geojson import NoArea, read_json
-from rtshcua.ground.exchange.geojson_features import features_of, is_ed269, is_ed318, is_point, read_feature, read_point
+from rtshcua.ground.exchange.geojson_features import (
+    features_of,
+    is_ed269,
+    is_ed269_feature,
+    is_ed318,
+    is_point,
+    read_feature,
+    read_point,
+)
 from rtshcua.ground.exchange.kml_document import kml_of, read_kml
 from rtshcua.ground.exchange.kml_zones import zones_of_kml
 from rtshcua.ground.exchange.losses import LOSSES, Loss, NotKept, NotReadable, comment, grouped, left_out
@@ -379,7 +387,12 @@ def _imported_json(request: ImportRequest, terms: ZoneTerms, data: bytes) -> Imp
         losses: list[Loss] = []
         kind = "geojson"
         for place, each in features:
-            if is_ed318(each):
+            if is_ed269_feature(each):
+                from rtshcua.ground.exchange.geographical_zones import read_ed269_feature
+
+                kind = "ed-269"
+                found += read_ed269_feature(each, place)
+            elif is_ed318(each):
                 from rtshcua.ground.exchange.geographical_zones import read_ed318
 
                 kind = "ed-318"

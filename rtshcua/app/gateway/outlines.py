@@ -1,4 +1,4 @@
-"""Read the outline of an area from a GeoJSON or KML file.
+"""Read the outline of an area from a GeoJSON, KML or KMZ file.
 
 A KML file is written as GeoJSON and read by the same strict reader, so both have the same checks.
 """
@@ -13,7 +13,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.kinds import ARCHIVE, GEOJSON, KML, recognised
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.checker.geojson import GeoPolygon, NoArea, read_area
-from rtshcua.ground.exchange.kml_document import polygons_as_geojson
+from rtshcua.ground.exchange.kml_document import kml_of, polygons_as_geojson
 from rtshcua.ground.exchange.losses import NotReadable
 from rtshcua.ground.language.size_limits import MAX_SIZE
 
@@ -28,11 +28,11 @@ def read_outline(path: Path, feature: str | None = None) -> tuple[GeoPolygon, ..
         return Refusal("input", f"cannot read `{path}`: {words_of(error)}", "", ExitCode.INPUT)
     if len(data) > MAX_SIZE:
         return _refused(path, f"it has more than {MAX_SIZE >> 20} MiB", "simplify the outline")
-    kind = recognised(data)
-    if path.suffix.lower() == ".kmz" or kind is ARCHIVE:
-        return _refused(path, "it is an archive", f"unzip it, and use its `doc.kml`: `unzip {path.name} doc.kml`")
-    is_kml = kind is KML or (kind is not GEOJSON and path.suffix.lower() == ".kml")
     try:
+        if path.suffix.lower() == ".kmz" or recognised(data) is ARCHIVE:
+            data = kml_of(data)
+        kind = recognised(data)
+        is_kml = kind is KML or (kind is not GEOJSON and path.suffix.lower() in (".kml", ".kmz"))
         return read_area(polygons_as_geojson(data) if is_kml else data, feature)
     except NotReadable as error:
         return _refused(path, str(error), error.help)

@@ -8,6 +8,7 @@ address, are not validated, because many published files lack them or write them
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from typing import Any, Final
 
@@ -76,6 +77,20 @@ def _ed269_zone(zone: Any, place: str) -> Iterator[ZoneFeature]:
         except (UnkeptFeature, NotReadable, NoArea) as error:
             made = _refused(made, error)
         yield made
+
+
+def read_ed269_feature(feature: dict[str, Any], place: str) -> Iterator[ZoneFeature]:
+    """The zones of a feature of GeoJSON whose properties are a zone of ED-269: the limits are in its `geometry`, the
+    outline in that of the feature.
+    """
+    properties = dict(feature["properties"])
+    limits = properties["geometry"]
+    outline = feature.get("geometry")
+    if isinstance(limits, list) and len(limits) == 1:
+        limits = limits[0]
+    properties["geometry"] = [{**limits, "horizontalProjection": outline}] if isinstance(limits, dict) else []
+    for made in _ed269_zone(properties, place):
+        yield replace(made, place=place)
 
 
 def _volume(made: ZoneFeature, volume: Any) -> None:

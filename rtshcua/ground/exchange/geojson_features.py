@@ -114,6 +114,12 @@ def is_ed269(tree: Any) -> bool:
     )
 
 
+def is_ed269_feature(feature: Any) -> bool:
+    """Whether a feature of GeoJSON has the members of ED-269 as its properties, as some national feeds write them."""
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    return isinstance(properties, dict) and {"restriction", "applicability", "geometry"} <= properties.keys()
+
+
 def is_ed318(feature: Any) -> bool:
     """Whether a feature of GeoJSON is a zone of ED-318."""
     properties = feature.get("properties") if isinstance(feature, dict) else None

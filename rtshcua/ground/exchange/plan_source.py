@@ -40,6 +40,8 @@ _DEFAULT_FASTEST: Final = 8_000
 _LONGEST_MIN: Final = 240  # the longest lifetime of an invocation
 #: time to accelerate, to brake and to settle at a place, s
 _TURN_S: Final = 12
+#: the slowest climb or descent of a leg, mm/s
+_SLOWEST_CLIMB: Final = 1_000
 #: skills that end a mission
 _LAST: Final = ("return_home", "emergency_land")
 
@@ -105,20 +107,21 @@ def extent_of(plan: QgcPlan, home: GeoPoint) -> PlanExtent:
         way.append((*place, _above_home(item, plan.home_above_sea)))
     waits = [each.params[0] or 0 for each in plan.items if each.command not in _NOT_WAITING]
     speeds = [each.params[1] or 0 for each in plan.items if each.command == enums.MAV_CMD_DO_CHANGE_SPEED]
+    slowest = min((int(each * 1000) for each in speeds if each >= 1), default=CRUISE)
     return PlanExtent(
         max(_length(x, y) for x, y, _ in way),
         max(height for _, _, height in way),
-        max((_leg_s(*pair) for pair in pairwise(way)), default=0),
+        max((_leg_s(*pair, slowest) for pair in pairwise(way)), default=0),
         int(max(waits, default=0)),
         int(max(speeds, default=0) * 1000),
         len(way),
     )
 
 
-def _leg_s(begin: tuple[int, int, int], end: tuple[int, int, int]) -> int:
-    """The time of a leg at cruise, with acceleration, or of its climb or descent."""
-    level = -(-_length(end[0] - begin[0], end[1] - begin[1]) // CRUISE)
-    return max(level, -(-abs(end[2] - begin[2]) // CLIMB)) + _TURN_S
+def _leg_s(begin: tuple[int, int, int], end: tuple[int, int, int], slowest: int) -> int:
+    """The time of a leg, with acceleration and its climb or descent, at most."""
+    level = -(-_length(end[0] - begin[0], end[1] - begin[1]) // min(slowest, CRUISE))
+    return level - (-abs(end[2] - begin[2]) // _SLOWEST_CLIMB) + _TURN_S
 
 
 _NOT_WAITING: Final = (enums.MAV_CMD_NAV_TAKEOFF, enums.MAV_CMD_NAV_LAND, enums.MAV_CMD_DO_CHANGE_SPEED, 84, 85)

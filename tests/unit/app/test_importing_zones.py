@@ -177,6 +177,15 @@ def test_zones_of_ed318() -> None:
     assert "circle(47.3980000 N, 8.5450000 E, 250.5 m)" in found_in(ed318(point)).text
 
 
+def test_ed269_as_properties_of_geojson() -> None:
+    pytest.importorskip("uas_standards", reason="the extra `import` is not installed")
+    limits = {name: value for name, value in volume().items() if name != "horizontalProjection"}
+    feed = geojson(ed269_zone(geometry=limits | {"upperLimit": 120, "upperVerticalReference": "AGL"}))
+    assert items(feed, "feed.geojson", **SITE) == ["ceiling 580 m above sea"]
+    assert "hole (" in found_in(feed, "feed.geojson", **SITE).text
+    assert items(geojson(ed269_zone(geometry=limits), "LineString", SQUARE))[0].startswith("refused: it is not valid")
+
+
 #: GeoJSON of other feeds
 FEEDS: list[tuple[str, Any, list[str]]] = [
     ("a plain area", geojson({"name": "field"}), [""]),

@@ -22,7 +22,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "check map_": ("*.html",),
     "picture": ("*.svg",),
     "check since": ("*.bundle", "*.rts"),
-    "gateway inside": ("*.kml", "*.geojson", "*.json"),
+    "gateway inside": ("*.kml", "*.kmz", "*.geojson", "*.json"),
     "gateway policy": _SOURCES,
     "compile source": ("*.rts", "*.json"),
     "compile replaces": _BUNDLE,

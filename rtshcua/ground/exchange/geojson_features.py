@@ -189,6 +189,8 @@ def place_of(longitude: Decimal, latitude: Decimal) -> tuple[int, int]:
 
 def _band(properties: dict[str, Any]) -> _Band:
     """The limits of a feature, in the form of its members."""
+    if "NOTAM_KEY" in properties:  # a temporary restriction of the FAA
+        raise UnkeptFeature("its heights and times are in a notice, not in the file", "write it from the notice")
     for forms in (_openaip, _faa_airspace, _faa_facility_map):
         found = forms(properties)
         if found is not None:
@@ -209,7 +211,7 @@ def _openaip(properties: dict[str, Any]) -> _Band | None:
     if hours is not None and not _is_always(hours):
         raise UnkeptFeature("its hours of operation are local or by notice, which the file does not place in time")
     comments = tuple(f"{name} {value}" for name in ("class", "icaoClass", "type") if (value := _text(properties, name)))
-    read = (high, low, "hoursOfOperation", *_BY_NOTAM, "upperLimitMax", "lowerLimitMin", "createdAt", "updatedAt")
+    read = (high, low, "hoursOfOperation", *_BY_NOTAM)
     return _Band(_openaip_limit(properties[low]), _openaip_limit(properties[high]), comments, read)
 
 

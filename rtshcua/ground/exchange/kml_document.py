@@ -142,16 +142,17 @@ def read_kml(data: bytes) -> KmlDocument:
 
 
 def _features(root: Element) -> Iterator[Element]:
-    """Placemarks, overlays and links, in the order of the document; not what is inside of them."""
+    """Placemarks, overlays, links, and spans of whole folders, in the order of the document; not what is inside."""
     open_ = [root]
     while open_:
         element = open_.pop()
         if _tag(element) in ("kml", "Document", "Folder"):
             open_ += reversed(element)
-        elif _tag(element) in ("Placemark", "NetworkLink", "GroundOverlay", "PhotoOverlay", "ScreenOverlay", "Tour"):
+        elif _tag(element) in ("Placemark", "NetworkLink", *_OVERLAYS, "TimeSpan"):
             yield element
 
 
+_OVERLAYS: Final = ("GroundOverlay", "PhotoOverlay", "ScreenOverlay", "Tour")
 #: elements of a placemark that are its geometry, or are read
 _GEOMETRIES: Final = ("Polygon", "LineString")
 _OTHER_GEOMETRIES: Final = ("Point", "LinearRing", "Model", "Track", "MultiTrack")

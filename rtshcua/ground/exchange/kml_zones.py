@@ -25,6 +25,11 @@ from rtshcua.ground.exchange.zone_features import GROUND, SEA, Limit, Period, Un
 from rtshcua.ground.exchange.zone_source import polygons_text
 
 _DATUMS = {ABSOLUTE: SEA, RELATIVE: GROUND}
+#: elements that may change where or when a zone is, with the reason why they are not kept and a help
+_UNKEPT = {
+    "NetworkLink": ("its content is elsewhere, and no link is followed", "save the document with its content"),
+    "TimeSpan": ("it limits a whole folder", "give each placemark its own span"),
+}
 #: elements of a placemark by the loss that they are
 _LOSSES = {
     "description": "description", "Snippet": "description", "snippet": "description", "address": "description",
@@ -43,12 +48,8 @@ class KmlZones(NamedTuple):
 
 def zones_of_kml(document: KmlDocument, width_mm: int | None, use: str) -> KmlZones:
     """The zones of a document. `use`: what they are for."""
-    losses = [Loss("style", place, tag) for tag, place in document.others if tag != "NetworkLink"]
-    links = [
-        NotKept("NetworkLink", place, "its content is elsewhere, and no link is followed", "save it with its content")
-        for tag, place in document.others
-        if tag == "NetworkLink"
-    ]
+    losses = [Loss("style", place, tag) for tag, place in document.others if tag not in _UNKEPT]
+    links = [NotKept(tag, place, *_UNKEPT[tag]) for tag, place in document.others if tag in _UNKEPT]
     features = []
     for mark in document.marks:
         losses += _losses(mark)

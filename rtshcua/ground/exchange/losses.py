@@ -33,7 +33,7 @@ LOSSES: Final[Mapping[str, str]] = MappingProxyType(
         "rally-points": "the vehicle returns to home, not to a rally point",
         "region-of-interest": "the vehicle does not turn towards the place",
         "survey-parameters": "the planned legs are kept; area, spacing, overlap and camera are not",
-        "takeoff-place": "the vehicle takes off where it stands",
+        "takeoff-place": "the vehicle climbs where it stands, as ArduCopter does",
         "vehicle-type": "the steps are for a multicopter, whatever vehicle the plan is for",
         "vertical-speed": "the vehicle climbs and descends with its own speeds",
         "vtol": "there is no transition: the steps are for a multicopter",

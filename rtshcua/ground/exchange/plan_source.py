@@ -40,8 +40,6 @@ _DEFAULT_FASTEST: Final = 8_000
 _LONGEST_MIN: Final = 240  # the longest lifetime of an invocation
 #: time to accelerate, to brake and to settle at a place, s
 _TURN_S: Final = 12
-#: the slowest climb or descent of a leg, mm/s
-_SLOWEST_CLIMB: Final = 1_000
 #: skills that end a mission
 _LAST: Final = ("return_home", "emergency_land")
 
@@ -121,7 +119,7 @@ def extent_of(plan: QgcPlan, home: GeoPoint) -> PlanExtent:
 def _leg_s(begin: tuple[int, int, int], end: tuple[int, int, int], slowest: int) -> int:
     """The time of a leg, with acceleration and its climb or descent, at most."""
     level = -(-_length(end[0] - begin[0], end[1] - begin[1]) // min(slowest, CRUISE))
-    return level - (-abs(end[2] - begin[2]) // _SLOWEST_CLIMB) + _TURN_S
+    return level - (-abs(end[2] - begin[2]) // CLIMB) + _TURN_S
 
 
 _NOT_WAITING: Final = (enums.MAV_CMD_NAV_TAKEOFF, enums.MAV_CMD_NAV_LAND, enums.MAV_CMD_DO_CHANGE_SPEED, 84, 85)

@@ -220,18 +220,17 @@ class _Translating:
 
     def _tell(self, item: QgcItem) -> None:
         """The losses that depend on the policy's home."""
-        if item.command in (_TAKEOFF, _VTOL_TAKEOFF):
-            there = self._there(item)
-            if there is not None and _apart(there, self._table.home) > _NEAR:
-                self._losses.append(Loss("takeoff-place", item.place, _written(there)))
+        if item.command in (_TAKEOFF, _VTOL_TAKEOFF) and self._plan.is_ardupilot and self._is_elsewhere(item):
+            self._losses.append(Loss("takeoff-place", item.place, command_name(item.command)))
         if _flies(item.command) and item.command not in (_LAND, _VTOL_LAND) and item.frame in SEA_FRAMES:
             self._losses.append(Loss("height-datum", item.place, f"{item.params[6]} m above sea"))
 
-    def _there(self, item: QgcItem) -> tuple[int, int] | None:
+    def _is_elsewhere(self, item: QgcItem) -> bool:
+        """Whether an item has a place that is not home. After a take-off there, PX4 flies to it (`mission.cpp`)."""
         latitude, longitude = item.params[4:6]
         if latitude is None or longitude is None or not (latitude or longitude):
-            return None
-        return degrees_e7(latitude), degrees_e7(longitude)
+            return False
+        return _apart((degrees_e7(latitude), degrees_e7(longitude)), self._table.home) > _NEAR
 
     # ---------------------------------------------------------------- MAVLink
 
@@ -248,6 +247,10 @@ class _Translating:
         waits = params[0] if command in (WAYPOINT, _NAV_DELAY) else 0.0
         if command == WAYPOINT:
             yield whole._replace(fields=fields | {"param1": 0.0})
+        if command == _TAKEOFF and not self._plan.is_ardupilot and self._is_elsewhere(item):
+            yield whole
+            yield whole._replace(fields=fields | {"command": WAYPOINT, "param1": 0.0})
+            return
         if waits > 0:
             stays = {"command": LOITER_TIME, "x": 0, "y": 0, "z": 0.0, "param1": waits}
             yield whole._replace(fields=fields | stays)

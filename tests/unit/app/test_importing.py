@@ -222,11 +222,20 @@ def test_a_plan_that_begins_with_a_flight_gets_a_climb() -> None:
     assert lost(found)["added-takeoff"] == ["/mission/items/0"]
 
 
+def test_after_a_takeoff_elsewhere_px4_flies_there_and_arducopter_does_not() -> None:
+    away = at(22, 5, 5, 20)
+    px4 = imported(plan(away, RETURN, firmware=PX4))
+    assert steps(px4)[:2] == ["takeoff(altitude = 20 m)", "goto(target = 47.3982400 N, 8.5460900 E, altitude = 20 m)"]
+    ardupilot = imported(plan(away, RETURN, firmware=ARDUPILOT))
+    assert steps(ardupilot) == ["takeoff(altitude = 20 m)", "return_home()"]
+    assert lost(ardupilot)["takeoff-place"] == ["/mission/items/0"]
+
+
 def test_other_losses_of_a_plan_are_named() -> None:
-    value = plan(at(22, 5, 5, 20), *TO, RETURN, vehicleType=1, rally=[[47.3, 8.5, 30]])
+    value = plan(TAKEOFF, *TO, RETURN, vehicleType=1, rally=[[47.3, 8.5, 30]])
     value["geoFence"]["breachReturn"] = [47.3, 8.5]
     found = imported(value)
-    names = {"takeoff-place", "vehicle-type", "rally-points", "no-fence", "breach-return", "planned-speed"}
+    names = {"vehicle-type", "rally-points", "no-fence", "breach-return", "planned-speed"}
     assert set(lost(found)) == names
     assert {each["name"] for each in found.as_object()["losses"]} == names  # type: ignore[attr-defined]
     assert names <= set(LOSSES)

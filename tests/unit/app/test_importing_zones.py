@@ -202,6 +202,9 @@ FEEDS: list[tuple[str, Any, list[str]]] = [
     ("OpenAIP, by notice", openaip((2500, 1, 1), (0, 1, 0), byNotam=True), ["refused: it is active by notice"]),
     ("OpenAIP, with hours", openaip((2500, 1, 1), (0, 1, 0), hoursOfOperation={"operatingHours": []}),
      ["refused: its hours"]),
+    ("OpenAIP, the greater of two limits", openaip((2500, 1, 1), (0, 1, 0), upperLimitMax={"value": 9}),
+     ["refused: it has members"]),
+    ("FAA temporary restriction", geojson({"NOTAM_KEY": "6/1234", "TITLE": "until Monday"}), ["refused: its heights"]),
     ("FAA class airspace", faa(), ["ceiling 914.4 m above sea"]),
     ("FAA, numbers as texts", faa(UPPER_VAL="3000"), ["ceiling 914.4 m above sea"]),
     ("FAA, no number", faa(UPPER_VAL="NaN"), ["refused: a limit is not a number"]),
@@ -288,6 +291,8 @@ def test_losses_of_kml_are_named_with_their_place() -> None:
         kml(mark(polygon()), "<NetworkLink><Link><href>http://x.invalid/</href></Link></NetworkLink>"), "a.kml"
     )
     assert [(each.name, each.place) for each in linked.not_kept] == [("NetworkLink", "NetworkLink[1]")]
+    spanned = found_in(kml("<Folder><TimeSpan/>", mark(polygon()), "</Folder>"), "b.kml")
+    assert [(each.name, each.place) for each in spanned.not_kept] == [("TimeSpan", "TimeSpan[1]")]
 
 
 def test_a_kmz_is_its_document() -> None:

@@ -20,7 +20,16 @@ from rtshcua.ground.checker.geojson import (
 )
 from rtshcua.ground.exchange.losses import Loss, NotReadable
 from rtshcua.ground.exchange.qgc_reading import degrees_e7
-from rtshcua.ground.exchange.zone_features import GROUND, PRESSURE, SEA, Limit, UnkeptFeature, ZoneFeature
+from rtshcua.ground.exchange.zone_features import (
+    GROUND,
+    PRESSURE,
+    SEA,
+    Limit,
+    Period,
+    UnkeptFeature,
+    ZoneFeature,
+    period_of,
+)
 from rtshcua.ground.exchange.zone_source import corridor_text, polygons_text
 
 _METRE, _FOOT = Decimal(1000), Decimal("304.8")
@@ -41,12 +50,13 @@ _WIDTH_HELP: Final = "state how wide its corridor is: `--width 20` in m"
 
 
 class _Band(NamedTuple):
-    """What a form says of a feature: its limits, comments, and the members that were read."""
+    """What a form says of a feature: its limits, comments, the members that were read, and its periods."""
 
     floor: Limit | None
     ceiling: Limit | None
     comments: tuple[str, ...]
     read: tuple[str, ...]
+    periods: tuple[Period, ...] = ()
 
 
 def features_of(tree: Any) -> list[tuple[str, dict[str, Any]]]:
@@ -92,6 +102,7 @@ def read_feature(feature: dict[str, Any], place: str, width_mm: int | None, use:
     try:
         band = _band(properties)
         made.floor, made.ceiling, made.comments = band.floor, band.ceiling, band.comments
+        made.periods = band.periods
         rest = {name: value for name, value in properties.items() if name not in band.read}
         refuse_unread({**feature, "properties": rest}, place.rstrip("/"))
         made.shape = _shape(feature.get("geometry"), f"{place.rstrip('/')}/geometry", width_mm)
@@ -211,8 +222,17 @@ def _openaip(properties: dict[str, Any]) -> _Band | None:
     if hours is not None and not _is_always(hours):
         raise UnkeptFeature("its hours of operation are local or by notice, which the file does not place in time")
     comments = tuple(f"{name} {value}" for name in ("class", "icaoClass", "type") if (value := _text(properties, name)))
-    read = (high, low, "hoursOfOperation", *_BY_NOTAM)
-    return _Band(_openaip_limit(properties[low]), _openaip_limit(properties[high]), comments, read)
+    read = (high, low, "hoursOfOperation", "activationTimes", *_BY_NOTAM)
+    periods = tuple(_activations(properties.get("activationTimes") or []))
+    return _Band(_openaip_limit(properties[low]), _openaip_limit(properties[high]), comments, read, periods)
+
+
+def _activations(written: Any) -> Iterator[Period]:
+    """The periods of an airspace that is activated at times."""
+    for each in written if isinstance(written, list) else [None]:
+        if not isinstance(each, dict) or not (each.get("start") or each.get("end")):
+            raise UnkeptFeature("its activation times are not stated")
+        yield period_of(each.get("start"), each.get("end"))
 
 
 def _openaip_limit(written: dict[str, Any]) -> Limit:

@@ -118,10 +118,16 @@ def write_zones(features: Sequence[ZoneFeature], terms: ZoneTerms, names: Source
         if feature.use:
             used[feature.use] += [each.name for each in own]
         rules += [rule.replace("ZONE", each.name) for rule in feature.rules for each in own]
-    airspace = " ".join(f"{use} {', '.join(some)}" for use, some in used.items() if some)
-    return WrittenZones(
-        tuple(zones), ((f"airspace {airspace}",) if airspace else ()) + tuple(rules), tuple(losses), tuple(not_kept)
-    )
+    airspace = _airspace(used[INSIDE], used[OUTSIDE])
+    return WrittenZones(tuple(zones), (*airspace, *rules), tuple(losses), tuple(not_kept))
+
+
+def _airspace(inside: Sequence[str], outside: Sequence[str]) -> Iterator[str]:
+    """The item of a policy. It is inside of one zone: of several, a vehicle would have to be inside of all."""
+    parts = [f"inside {inside[0]}"] if inside else []
+    parts += [f"outside {', '.join(outside)}"] if outside else []
+    if parts:
+        yield f"airspace {' '.join(parts)}" + (f"  // or inside {', '.join(inside[1:])}" if inside[1:] else "")
 
 
 def _zones_of(feature: ZoneFeature, terms: ZoneTerms, names: SourceNames) -> Iterator[SourceZone]:

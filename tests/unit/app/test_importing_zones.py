@@ -249,6 +249,8 @@ def test_terrain_shrinks_a_zone_to_stay_inside_of() -> None:
     assert items(text, "b.kml", terrain="400..460", use="inside") == ["ceiling 520 m above sea"]
     inside = found_in(text, "c.kml", terrain="400..460", use="inside")
     assert inside.rules == ("airspace inside quarry",)
+    two = found_in(kml(mark(polygon(), "north"), mark(polygon(), "south")), "d.kml", use="inside")
+    assert two.rules == ("airspace inside north  // or inside south",)
 
 
 #: placemarks, and the items of their zones

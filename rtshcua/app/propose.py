@@ -1,13 +1,13 @@
 """Check missions that an agent proposes against the policy's sources, as read when the server began."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import rtshcua.ground.agent.specification  # noqa: F401  loaded before a proposal comes, which may not wait for it
-from rtshcua.app.programs import SourceReader, compile_reading, examine
+from rtshcua.app.programs import NO_TEXTS, SourceReader, compile_reading, examine
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.agent.narrowed_schema import narrowed, permitted_skills
 from rtshcua.ground.agent.rejections import frame_of, rejections
@@ -43,14 +43,14 @@ class ProposalAnswer:
 
 
 class Missions:
-    """Checks proposals against the policy of `sources`. Each file is read once; later changes are ignored. Raises
-    `NoPolicy`.
+    """Checks proposals against the policy of `sources`. Each file is read once; later changes are ignored. `texts`
+    stand in the place of files, by their shown names. Raises `NoPolicy`.
     """
 
-    def __init__(self, sources: Sequence[Path]) -> None:
+    def __init__(self, sources: Sequence[Path], texts: Mapping[str, bytes] = NO_TEXTS) -> None:
         self._reader = SourceReader(sources, once=True)
         self._names = [str(path) for path in sources]
-        reading = self._reader.program(self._names)
+        reading = self._reader.program(self._names, texts)
         program, checked = reading.program, examine(reading)
         if has_errors(checked.diagnostics):
             raise NoPolicy(f"the policy's sources have errors: {checked.diagnostics[0].message}")

@@ -26,18 +26,16 @@ DOCUMENT: Final = FileKind("a signed document", "`rtshcua show` prints it")
 KEY: Final = FileKind("a key", "`rtshcua show` names its duty; keep a private key secret")
 SPECIFICATION: Final = FileKind("a mission specification", "`rtshcua compile FILE.json --with POLICY.rts` compiles it")
 SOURCE: Final = FileKind("a source", "`rtshcua compile FILE.rts -o FILE.bundle` makes a bundle of it")
-PLAN: Final = FileKind(
-    "a QGroundControl plan", "plans are not supported: write the mission as a source, its fence and zones as `zone`"
-)
+PLAN: Final = FileKind("a QGroundControl plan", "`rtshcua import FILE.plan -o FILE.rts` makes a source of it")
 WAYPOINTS: Final = FileKind(
     "a list of waypoints (QGC WPL)", "waypoint lists are not supported: write the mission as a source"
 )
 GEOJSON: Final = FileKind("GeoJSON", 'read it from a source: `zone NAME from "FILE.geojson"`')
 ED269: Final = FileKind(
     "a list of geographical zones (ED-269)",
-    "ED-269 is not supported: write each zone with its heights and times as `zone`",
+    "`rtshcua import FILE -o FILE.rts` makes zones of it",
 )
-KML: Final = FileKind("KML", 'convert it to GeoJSON and read it from a source: `zone NAME from "FILE.geojson"`')
+KML: Final = FileKind("KML", "`rtshcua import FILE.kml -o FILE.rts` makes zones of it")
 ARCHIVE: Final = FileKind("a ZIP archive", "extract the file that you need")
 PDF: Final = FileKind("a PDF document", "")
 HTML: Final = FileKind("a web page", "")

@@ -15,14 +15,23 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.suggest import listed, nearest
 from rtshcua.ground.checker.geojson import GeoPolygon
+from rtshcua.ground.exchange.stock_policy import (
+    CLIMB,
+    CRUISE,
+    ERROR_MM,
+    LEAST_HIGHEST_MM,
+    WITHIN_MM,
+    GeoPoint,
+    size_line,
+    vehicle_lines,
+)
+from rtshcua.ground.exchange.zone_source import metres, place_text
 from rtshcua.ground.format.format_text import format_text
 from rtshcua.ground.geometry.projection import projection_at
 from rtshcua.model.flat.zone import Projection, project
-from rtshcua.model.quantity import Dimension, display
 
-#: names of the policy, its vehicle and its area
+#: names of the policy and its area
 POLICY: Final = "gateway"
-VEHICLE: Final = "copter"
 AREA: Final = "field"
 
 #: skills that always remain permitted: a chain of fallbacks ends in them
@@ -40,25 +49,11 @@ LOWEST_MM, HIGHEST_MM = 5_000, 500_000
 RADIUS_MM: Final = 100_000
 #: how far the ceiling of the area is above the highest permitted altitude, in mm: room to overshoot
 _HEADROOM_MM: Final = 10_000
-#: the lowest `highest` of the library's skills
-_LEAST_HIGHEST_MM: Final = 10_000
-#: position error, and how far home may be from the declared place, in mm
-_ERROR_MM: Final = 3_000
-_WITHIN_MM, _LEAST_WITHIN_MM = 10_000, 2_000
-#: figures of the library's vehicle: mm/s, and the endurance in flight, s
-_CRUISE, _CLIMB = 5_000, 1_500
-_FLIGHT_S: Final = 16 * 60
+#: the least `within` of home, in mm
+_LEAST_WITHIN_MM: Final = 2_000
 #: the longest leg and way home, in seconds. A step needs the charge for the longest that its skill permits: in a large
 #: area a longer leg is refused, instead of every leg with less charge
 _LONGEST_LEG_S, _LONGEST_HOME_S = 225, 320
-_SPEEDS: Final = "cruise 5 m/s, climb 1.5 m/s, descent 1.5 m/s, landing 0.5 m/s below 10 m, return 5 m/s, air 16 m/s"
-
-
-class GeoPoint(NamedTuple):
-    """A place in 1e-7 degree."""
-
-    latitude: int
-    longitude: int
 
 
 class QuickRules(NamedTuple):
@@ -124,7 +119,7 @@ def policy_text(rules: QuickRules, home: GeoPoint, return_mm: int, version: int 
 def _introduction(rules: QuickRules) -> str:
     typed = ",".join("land" if skill == "emergency_land" else skill for skill in rules.allow)
     return (
-        f"// What `rtshcua gateway --allow {typed} --below {_m(rules.below_mm)}` permits.\n"
+        f"// What `rtshcua gateway --allow {typed} --below {metres(rules.below_mm)}` permits.\n"
         "// Whatever no rule permits is denied. Change it as you need, and raise the version with every change."
     )
 
@@ -136,49 +131,29 @@ def _imports(rules: QuickRules) -> Iterator[str]:
 
 def _sizes(rules: QuickRules, across_mm: int) -> Iterator[str]:
     """The sizes of the library's skills for this height and this area."""
-    highest = _m(max(rules.below_mm, _LEAST_HIGHEST_MM))
-    climb_s = -(-rules.below_mm // _CLIMB)
-    leg_s = min(-(-across_mm // _CRUISE) + climb_s + 15, _LONGEST_LEG_S)
-    home_s = min(-(-across_mm // _CRUISE) + 2 * climb_s + 45, _LONGEST_HOME_S)
+    highest = metres(max(rules.below_mm, LEAST_HIGHEST_MM))
+    climb_s = -(-rules.below_mm // CLIMB)
+    leg_s = min(-(-across_mm // CRUISE) + climb_s + 15, _LONGEST_LEG_S)
+    home_s = min(-(-across_mm // CRUISE) + 2 * climb_s + 45, _LONGEST_HOME_S)
     if "takeoff" in rules.allow:
-        yield _size("takeoff", f"highest = {highest}, ", climb_s + 15, 60, 4)
+        yield size_line("takeoff", f"highest = {highest}, ", climb_s + 15, 60, 4)
     if "goto" in rules.allow:
-        yield _size("goto", f"highest = {highest}, ", leg_s, 120, 7)
-    yield _size("return_home", "", home_s, 240, 17)
-    yield _size("emergency_land", "", climb_s + 30, 120, 8)
+        yield size_line("goto", f"highest = {highest}, ", leg_s, 120, 7)
+    yield size_line("return_home", "", home_s, 240, 17)
+    yield size_line("emergency_land", "", climb_s + 30, 120, 8)
     yield ""
-
-
-def _size(skill: str, highest: str, longest_s: int, default_s: int, default_percent: int) -> str:
-    """The sizes of a skill: no less than its defaults, of time and charge."""
-    longest, charge = max(longest_s, default_s), max(_percent(longest_s), default_percent)
-    return f"sizes {skill}({highest}longest = {longest} s, charge = {charge} %)"
 
 
 def _vehicle(rules: QuickRules, home: GeoPoint, within_mm: int, return_mm: int) -> Iterator[str]:
     yield "// The vehicle, where it stands now. The figures are those that stock PX4 and ArduCopter keep: use your own."
-    yield f"vehicle {VEHICLE} {{"
-    yield f'  identity "{rules.identity}"'
-    yield f"  home     {_place(home)} within {_m(within_mm)}"
-    yield "  speed    at most 12 m/s"
-    yield "  climb    at most 3 m/s"
-    yield f"  position error {_m(_ERROR_MM)}"
-    yield "  energy   100 % = 18 min hover, 16 min flight"
-    yield "  brakes   from 12 m/s in 6 s after 500 ms"
-    yield f"  speeds   {_SPEEDS}"
-    yield "  accelerates to 5 m/s in 5 s"
-    yield "  wind     at most 8 m/s"
-    yield f"  return   at {_m(return_mm)}"
-    yield "  reserve  15 %"
-    yield "  without  wind.speed, obstacle.distance, link.quality"
-    yield "}"
+    yield from vehicle_lines(rules.identity, home, within_mm, return_mm)
 
 
 def _area(rules: QuickRules, home: GeoPoint) -> Iterator[str]:
-    ceiling = f"ceiling {_m(rules.below_mm + _HEADROOM_MM)} above home"
+    ceiling = f"ceiling {metres(rules.below_mm + _HEADROOM_MM)} above home"
     if not rules.area:
-        yield f"// No `--inside` was given: the area is a circle of {_m(RADIUS_MM)} around home."
-        yield f"zone {AREA} = circle({_place(home)}, {_m(RADIUS_MM)}) {ceiling}"
+        yield f"// No `--inside` was given: the area is a circle of {metres(RADIUS_MM)} around home."
+        yield f"zone {AREA} = circle({place_text(*home)}, {metres(RADIUS_MM)}) {ceiling}"
         return
     names = [AREA] if len(rules.area) == 1 else [f"{AREA}_{number}" for number in range(1, len(rules.area) + 1)]
     for name, polygon in zip(names, rules.area, strict=True):
@@ -193,7 +168,7 @@ def _area(rules: QuickRules, home: GeoPoint) -> Iterator[str]:
 
 
 def _policy(rules: QuickRules, version: int) -> Iterator[str]:
-    top = f"altitude <= {_m(rules.below_mm)}"
+    top = f"altitude <= {metres(rules.below_mm)}"
     yield f"policy {POLICY} version {version} {{"
     if "takeoff" in rules.allow:
         yield f"  permit  takeoff by role operator through agent  when {top}"
@@ -220,16 +195,16 @@ def _within(area: Sequence[GeoPolygon], plane: Projection) -> int:
     inside = [shape for shape in _shapes(area, plane) if shape.contains(Point(0, 0))]
     if area and not inside:
         return -1
-    room = min((int(shape.boundary.distance(Point(0, 0))) for shape in inside), default=_WITHIN_MM * 2)
-    return max(0, min(_WITHIN_MM, (room - _ERROR_MM - 1_000) // 1_000 * 1_000))
+    room = min((int(shape.boundary.distance(Point(0, 0))) for shape in inside), default=WITHIN_MM * 2)
+    return max(0, min(WITHIN_MM, (room - ERROR_MM - 1_000) // 1_000 * 1_000))
 
 
 def _outside(area: Sequence[GeoPolygon], plane: Projection, within_mm: int) -> Refusal:
     away = min(int(shape.boundary.distance(Point(0, 0))) for shape in _shapes(area, plane))
     where = "outside the area" if within_mm < 0 else "too near to the edge of the area"
-    text = f"the vehicle is {where}: {_m(away // 100 * 100)} from its edge"
-    least = _ERROR_MM + _LEAST_WITHIN_MM + 1_000
-    help = f"it must start inside, at least {_m(least)} from the edge: move it, or use another `--inside`"
+    text = f"the vehicle is {where}: {metres(away // 100 * 100)} from its edge"
+    least = ERROR_MM + _LEAST_WITHIN_MM + 1_000
+    help = f"it must start inside, at least {metres(least)} from the edge: move it, or use another `--inside`"
     return Refusal("outside-area", text, help, ExitCode.REFUSED)
 
 
@@ -257,23 +232,4 @@ def _shapes(area: Sequence[GeoPolygon], plane: Projection) -> list[Polygon]:
 
 def _corners(ring: Sequence[tuple[int, int]]) -> Iterator[str]:
     for longitude, latitude in ring:
-        yield f"  {_place(GeoPoint(latitude, longitude))},"
-
-
-def _place(place: GeoPoint) -> str:
-    north, east = "N" if place.latitude >= 0 else "S", "E" if place.longitude >= 0 else "W"
-    return f"{_degrees(place.latitude)} {north}, {_degrees(place.longitude)} {east}"
-
-
-def _degrees(value: int) -> str:
-    whole, rest = divmod(abs(value), 10_000_000)
-    return f"{whole}.{rest:07d}"
-
-
-def _m(length: int) -> str:
-    return display(length, Dimension.LENGTH)
-
-
-def _percent(seconds: int) -> int:
-    """The charge for a time in flight, rounded up, and 1 % more."""
-    return min(80, -(-100 * seconds // _FLIGHT_S) + 1)
+        yield f"  {place_text(latitude, longitude)},"

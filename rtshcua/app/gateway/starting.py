@@ -32,12 +32,13 @@ from rtshcua.app.gateway.configuration import (
 )
 from rtshcua.app.gateway.gateway_service import FlightWords, GatewayConsole, GatewayService
 from rtshcua.app.gateway.policy_in_force import PolicyInForce, Unlock, development_keys, policy_in_force
-from rtshcua.app.gateway.quick_policy import POLICY, GeoPoint, QuickRules, policy_text, start_inside
+from rtshcua.app.gateway.quick_policy import POLICY, QuickRules, policy_text, start_inside
 from rtshcua.app.gateway.relay_process import StartedRelay
 from rtshcua.app.gateway.vehicle_facts import VehicleFacts, examine
 from rtshcua.app.gateway.vehicle_state import VehicleFrames
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.exchange.stock_policy import GeoPoint
 from rtshcua.ground.language.size_limits import MAX_SIZE
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now

@@ -13,11 +13,11 @@ from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.app.exit_codes import code_of
 from rtshcua.app.fly.link_signing import LinkSigning
 from rtshcua.app.gateway.configuration import VehicleSide
-from rtshcua.app.gateway.quick_policy import GeoPoint
 from rtshcua.app.gateway.relay_process import StartedRelay
 from rtshcua.app.propose import Missions
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.exchange.stock_policy import GeoPoint
 from rtshcua.onboard.enforcement.frames import FrameSession
 
 #: how long to wait for the first heartbeat, then for its home, and then for its parameters, in seconds

@@ -25,11 +25,12 @@ class Row(NamedTuple):
     fast_path: bool = False  # `rtshcua.front.cli.fast_path` reads its plain command lines without typer
     reports: bool = False  # `--json` prints the object of `Findings`, also if the command line is wrong
     ends_in_order: bool = False  # Ctrl-C raises KeyboardInterrupt, so that the command can clean up
+    file: str = ""  # the name of its module, if that of the command is a keyword of Python
 
     @property
     def module(self) -> str:
         """The module that holds the command's `app`."""
-        return f"rtshcua.front.cli.commands.{self.name.replace('-', '_')}"
+        return f"rtshcua.front.cli.commands.{self.file or self.name.replace('-', '_')}"
 
 
 COMMANDS = (
@@ -56,6 +57,13 @@ COMMANDS = (
         reports=True,
     ),
     Row("compile", "write", "check a mission and sign it into a bundle that can fly", reports=True),
+    Row(
+        "import",
+        "write",
+        "turn plans, KML, GeoJSON and official zones into sources",
+        reports=True,
+        file="import_file",
+    ),
     Row("explain", "write", "print what a diagnostic code means, with a bad and a good example"),
     Row("docs", "write", "render skills and policies as one page for review and sign-off", reports=True),
     Row("schema", "write", "print the JSON Schema of a mission specification, for agents"),

@@ -180,7 +180,7 @@ def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
             "it is JSON, but not a GeoJSON object",
             'a GeoJSON object has a `"type"`, such as `"FeatureCollection"` (RFC 7946, 3)',
         )
-    _reference_system(tree)
+    reference_system(tree)
     if kind == "FeatureCollection":
         return _among(tree, feature)
     if kind == "Feature":
@@ -221,7 +221,7 @@ def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], s
 
 def _geometry(feature: dict[str, Any], pointer: str) -> tuple[dict[str, Any], str]:
     """RFC 7946, 3.2: the geometry of a Feature is a geometry object, or null without a place."""
-    _reference_system(feature)
+    reference_system(feature)
     refuse_unread(feature, pointer)
     geometry = feature.get("geometry")
     if geometry is None:
@@ -240,7 +240,7 @@ def _area(geometry: Any, pointer: str) -> tuple[dict[str, Any], str]:
             "a zone is read from a Polygon or a MultiPolygon",
         )
     assert isinstance(geometry, dict)
-    _reference_system(geometry)
+    reference_system(geometry)
     return geometry, pointer
 
 
@@ -277,8 +277,10 @@ def _known(features: list[dict[str, Any]], wanted: str | None = None) -> str | N
     return "select one with `feature`: " + ", ".join(f"`{name}`" for name in names[:MOST_NAMED]) + more
 
 
-def _reference_system(tree: dict[str, Any]) -> None:
-    """RFC 7946, 4: all positions are WGS 84. A `crs` of an older file must be the same (GeoJSON 2008, 3)."""
+def reference_system(tree: dict[str, Any]) -> None:
+    """Raise `NoArea` if an object names another reference system than WGS 84. RFC 7946, 4: all positions are WGS 84. A
+    `crs` of an older file must be the same (GeoJSON 2008, 3).
+    """
     crs = tree.get("crs")
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
@@ -364,7 +366,22 @@ def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
     return _polygons(geometry, pointer)
 
 
+def polygon_of(rings: Sequence[Any], pointer: str) -> GeoPolygon:
+    """A polygon from its rings as in a file, of positions whose values are `Number`; raises `NoArea`."""
+    return _polygon(rings, pointer)
+
+
 # ------------------------------------------------------------------------------------------------------------ JSON
+
+
+def read_json(data: bytes) -> Any:
+    """Parse the JSON of a file with the same limits and the same strictness as an area; numbers are `Number`. Raises
+    `NoArea`.
+    """
+    tree = _json(data)
+    if _positions(tree) > MAX_VALUES:
+        raise _not_json(f"it has more than {MAX_VALUES} positions: remove the features that are not needed")
+    return _all_laid_out(tree)
 
 
 def _json(data: bytes) -> Any:
@@ -538,6 +555,26 @@ def _laid_out(value: Any) -> Any:
         else:
             made.append(_laid_out(each))
     return made
+
+
+def _positions(tree: Any) -> int:
+    """The number of positions anywhere in a tree."""
+    return sum(map(_positions, tree.values())) if isinstance(tree, dict) else _listed_positions(tree)
+
+
+def _listed_positions(tree: Any) -> int:
+    if isinstance(tree, Run):
+        return tree.count()
+    return sum(map(_positions, tree)) if isinstance(tree, list) else 0
+
+
+def _all_laid_out(tree: Any) -> Any:
+    """A tree with the runs of all its lists parsed."""
+    if isinstance(tree, dict):
+        return {name: _all_laid_out(each) for name, each in tree.items()}
+    if not isinstance(tree, list):
+        return _laid_out(tree)
+    return [_all_laid_out(each) if isinstance(each, dict | list) else each for each in _laid_out(tree)]
 
 
 def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:

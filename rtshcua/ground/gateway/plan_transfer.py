@@ -257,7 +257,7 @@ def read_plan(
 
     An item that stays or lands at a place becomes a flight to the place, and then the step.
     """
-    made = _Steps(translation, shadows, now_us)
+    made = PlanSteps(translation, shadows, now_us)
     for number, item in enumerate(items):
         if autopilot == ARDUPILOT and number == 0:
             continue
@@ -269,8 +269,8 @@ def read_plan(
     return UploadedPlan(tuple(items), tuple(made.steps), tuple(made.item_of))
 
 
-class _Steps:
-    """Collects the steps of items, in order."""
+class PlanSteps:
+    """Collects the steps of items, in order. After a refusal, what `add` appended of that item is to be dropped."""
 
     def __init__(self, translation: Translation, shadows: Mapping[str, float], now_us: int) -> None:
         self._translation = translation

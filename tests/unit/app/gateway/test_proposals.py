@@ -15,10 +15,11 @@ from rtshcua.app.gateway.configuration import ConfiguredClient
 from rtshcua.app.gateway.gateway_service import FlightWords, GatewayService
 from rtshcua.app.gateway.policy_in_force import PolicyInForce, Unlock, development_keys, policy_in_force
 from rtshcua.app.gateway.proposals import FlightMission, ProposalMoment, Proposals, SignedProposal, arranged
-from rtshcua.app.gateway.quick_policy import GeoPoint, QuickRules, policy_text
+from rtshcua.app.gateway.quick_policy import QuickRules, policy_text
 from rtshcua.app.gateway.relay_process import StartedRelay
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.exchange.stock_policy import GeoPoint
 from rtshcua.ground.gateway.interface import Event, ProposalAnswered, ProposalChecked, Propose, ProposedStep
 from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart, StartPlace
 from rtshcua.model.flat.mission import Mission

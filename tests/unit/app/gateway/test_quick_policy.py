@@ -5,11 +5,12 @@ from typing import Any
 
 import pytest
 
-from rtshcua.app.gateway.quick_policy import GeoPoint, QuickRules, allowed_skills, policy_text, start_inside
+from rtshcua.app.gateway.quick_policy import QuickRules, allowed_skills, policy_text, start_inside
 from rtshcua.app.programs import examine, read_text
 from rtshcua.app.propose import Missions
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.checker.geojson import GeoPolygon
+from rtshcua.ground.exchange.stock_policy import GeoPoint
 from rtshcua.ground.format.format_text import format_text
 from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart, StartPlace
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
+from rtshcua.app.importing import PROPOSERS, SUFFIXES, TARGETS, USES
 from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.front.cli.table import COMMANDS
@@ -21,7 +22,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "check map_": ("*.html",),
     "picture": ("*.svg",),
     "check since": ("*.bundle", "*.rts"),
-    "gateway inside": ("*.kml", "*.geojson", "*.json"),
+    "gateway inside": ("*.kml", "*.kmz", "*.geojson", "*.json"),
     "gateway policy": _SOURCES,
     "compile source": ("*.rts", "*.json"),
     "compile replaces": _BUNDLE,
@@ -35,8 +36,13 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "logs": _LOGS,
     "anchors": ("*.anchors",),
     "export run": _LOGS,
+    "import file": tuple(f"*{each}" for each in SUFFIXES),
+    "import policy": _SOURCES,
     "why path": ("*.rts", "*.json", "*.bundle", "*.jsonl"),
 }
+
+#: the values of parameters of `import`
+IMPORTED: Final = {"to": TARGETS, "proposer": PROPOSERS, "use": USES}
 
 #: parameters that take folders
 FOLDERS: Final = frozenset({"directory", "folder", "runs", "save", "state_dir", "archive"})
@@ -52,6 +58,8 @@ def words(command: str, parameter: str) -> tuple[str, ...]:
         return FORMATS
     if (command, parameter) == ("export", "to"):
         return EXPORTS
+    if command == "import" and parameter in IMPORTED:
+        return IMPORTED[parameter]
     if (command, parameter) == ("schema", "form"):
         return tuple(FORMS)
     return LEVELS if parameter == "fail_on" else ()

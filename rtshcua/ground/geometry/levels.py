@@ -39,17 +39,24 @@ def heights_between(lowest: int, highest: int, every: int) -> tuple[int, ...]:
     return tuple(lowest + (highest - lowest) * number // count for number in range(count + 1)) if count else (lowest,)
 
 
-def levelled(points: Sequence[Point], heights: Sequence[int], *, inward: bool) -> LevelledPath:
-    """Return a path that is flown once at each height, or at the altitude of its step if there is none."""
+def levelled(points: Sequence[Point], heights: Sequence[int], headings: Sequence[int] = ()) -> LevelledPath:
+    """Return a path that is flown once at each height, or at the altitude of its step if there is none. `headings` are
+    those of one round, or empty.
+    """
     closed = points[0] == points[-1]
     way: list[Point] = []
+    turns: list[int] = []
     for number in range(len(heights) or 1):
-        way += points if closed or number % 2 == 0 else points[::-1]
-    headings: tuple[int, ...] = ()
-    if inward:
-        x, y = middle(points)
-        headings = tuple(bearing(x - east, y - north) for east, north in way)
-    return LevelledPath(tuple(way), tuple(height for height in heights for _ in points), headings)
+        onward = closed or number % 2 == 0
+        way += points if onward else points[::-1]
+        turns += headings if onward else headings[::-1]
+    return LevelledPath(tuple(way), tuple(height for height in heights for _ in points), tuple(turns))
+
+
+def inward(points: Sequence[Point]) -> tuple[int, ...]:
+    """Return the heading at each point of a closed path to its middle."""
+    x, y = middle(points)
+    return tuple(bearing(x - east, y - north) for east, north in points)
 
 
 def middle(points: Sequence[Point]) -> Point:

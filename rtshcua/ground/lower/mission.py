@@ -16,7 +16,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.geometry.levels import LEAST_STEP, heights_between, levelled
+from rtshcua.ground.geometry.levels import LEAST_STEP, heights_between, inward, levelled
 from rtshcua.ground.geometry.polygons import Point
 from rtshcua.ground.geometry.shapes import MultiPolygon, parts
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, survey
@@ -313,7 +313,7 @@ class StepLowering:
         points = self._survey_path(step, skill, bound, min(heights, default=plan.altitude))
         if points is None:
             return None
-        path = levelled(points, heights, inward=contract.motion.facing == Facing.INWARD)
+        path = levelled(points, heights, inward(points) if contract.motion.facing == Facing.INWARD else ())
         if len(path.points) > MAX_PATH:
             zone = argument_span(self._context, step, _target(skill))
             self._context.report.add(

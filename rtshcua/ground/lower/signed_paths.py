@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from rtshcua.decision.contracts import first_cell
-from rtshcua.ground.geometry.levels import LevelledPath, levelled
+from rtshcua.ground.geometry.levels import LevelledPath, inward, levelled
 from rtshcua.ground.geometry.polygons import Point, path_length
 from rtshcua.ground.geometry.shapes import shape_of
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, PATTERNS, survey
@@ -37,11 +37,12 @@ def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | Non
         return None
     signed = tuple(zip(one.plan.path[::2], one.plan.path[1::2], strict=True))
     its = LevelledPath(signed, one.plan.heights, one.plan.headings)
-    heights, inward = tuple(dict.fromkeys(one.plan.heights)), one.contract.motion.facing == Facing.INWARD
+    heights, faces = tuple(dict.fromkeys(one.plan.heights)), one.contract.motion.facing == Facing.INWARD
     found: tuple[Point, ...] | None = None
     for pattern in _patterns(policy, one):
         once = _survey(policy, one, pattern)
-        ways = [levelled(each, heights, inward=inward) for each in ((once, once[::-1]) if once else ())]
+        rounds = (once, once[::-1]) if once else ()
+        ways = [levelled(each, heights, inward(each) if faces else ()) for each in rounds]
         if its in ways:
             return None
         if signed in (way.points for way in ways):

@@ -7,7 +7,7 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as some
 
-from rtshcua.ground.geometry.levels import bearing, heights_between, levelled, middle
+from rtshcua.ground.geometry.levels import bearing, heights_between, inward, levelled, middle
 from rtshcua.model.flat.mission import ALONG, TURN
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from virtual.rows import rows
@@ -50,7 +50,7 @@ SQUARE = ((0, 0), (10, 0), (10, 10), (0, 10), (0, 0))
 
 
 def test_a_closed_path_goes_around_once_at_each_height() -> None:
-    path = levelled(SQUARE, (5, 9), inward=True)
+    path = levelled(SQUARE, (5, 9), inward(SQUARE))
     assert path.points == SQUARE * 2
     assert path.heights == (5,) * 5 + (9,) * 5
     assert path.headings == (4_500, 31_500, 22_500, 13_500, 4_500) * 2
@@ -58,11 +58,12 @@ def test_a_closed_path_goes_around_once_at_each_height() -> None:
 
 def test_an_open_path_goes_to_and_fro() -> None:
     there = ((0, 0), (10, 0))
-    assert levelled(there, (5, 7, 9), inward=False) == (there + there[::-1] + there, (5, 5, 7, 7, 9, 9), ())
+    assert levelled(there, (5, 7, 9)) == (there + there[::-1] + there, (5, 5, 7, 7, 9, 9), ())
+    assert levelled(there, (5, 7), (100, 200)).headings == (100, 200, 200, 100)
 
 
 def test_a_path_at_one_height_has_no_heights() -> None:
-    assert levelled(SQUARE, (), inward=False) == (SQUARE, (), ())
+    assert levelled(SQUARE, ()) == (SQUARE, (), ())
 
 
 def test_the_middle_is_that_of_the_area_and_not_of_the_corners() -> None:

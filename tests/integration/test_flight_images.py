@@ -78,6 +78,18 @@ def test_what_never_arrives_is_listed_before_the_landing_after_few_requests() ->
     verified(flown)
 
 
+def test_images_after_the_last_report_are_missed_by_their_number() -> None:
+    flying = flight("px4")
+    flown = flying.fly(Photographer(flying, never=lambda m: m.image_index >= 15))
+    stored = sum(shot.stored for shot in flown.vehicle.simulation.shots)
+    first, last = gaps_of(flown)[0], gaps_of(flown)[-1]
+    assert first.last >= 15, "before the landing"
+    assert len(details_of(flown)) == last.taken == 15
+    assert last.lost == ((15, last.last),)
+    assert stored - 2 <= last.last + 1 <= stored, "pictures of the last seconds on the ground"
+    verified(flown)
+
+
 @pytest.mark.parametrize("counter", list(faults.CameraCounter))
 def test_a_camera_that_restarts_begins_a_new_series_or_goes_on(counter: faults.CameraCounter) -> None:
     flying = flight("px4", faults.CameraReboot(20 * S, 3 * S, counter))

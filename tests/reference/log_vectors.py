@@ -21,7 +21,7 @@ from reference.attested_flight import attested
 from reference.forgery import LOG_KEY, flight, public_of, read, resealed, seed_of
 from reference.independent_boundary import Boundary
 from reference.independent_note import read_note
-from reference.independent_records import unbase64
+from reference.independent_records import canonical, unbase64
 from reference.independent_root import open_root
 from reference.independent_verifier import leaf, merkle
 from reference.resealing import Fields, line_of
@@ -154,6 +154,30 @@ def stalled() -> list[bytes]:
     )  # fmt: skip
 
 
+def imaged() -> list[bytes]:
+    """Images of one camera that restarts, a picture that failed, and the lists of missing ones."""
+    plain: Fields = {
+        "above_home_mm": 20_000, "above_sea_mm": 508_000, "asked": 0, "attitude": "camera", "camera": 100,
+        "file": "IMG_0001.JPG", "horizontal_mm": 900, "index": 0, "latitude": 473_977_400, "longitude": 85_455_900,
+        "pitch_cd": -9_000, "result": 1, "roll_cd": 0, "series": 0, "unit": 0, "utc_us": UTC_US,
+        "vertical_mm": None, "yaw_cd": 12_345,
+    }  # fmt: skip
+
+    def image(at: int, **changed: object) -> Fields:
+        return effect(at, event="image", detail=canonical({**plain, **changed}).decode())
+
+    def missing(at: int, *lost: list[int], **told: int) -> Fields:
+        detail = {"camera": 100, "lost": list(lost), **told}
+        return effect(at, event="images-missing", detail=canonical(detail).decode())
+
+    return log(
+        genesis(), image(10), image(20, index=3, asked=1), image(30, index=None, result=0, file=""),
+        missing(40, [1, 2], [4, 4], failed=1, first=0, last=4, missing=3, series=0, taken=2),
+        image(50, index=1, asked=2), image(60, series=1, latitude=None, longitude=None, above_sea_mm=None),
+        missing(70, failed=0, first=0, last=0, missing=0, series=1, taken=1), close(80),
+    )  # fmt: skip
+
+
 def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
     """The rejected logs: name, violated rule of the page, lines."""
     good = sealed()
@@ -264,6 +288,7 @@ def made() -> dict[str, bytes]:
         "attested": (list(attested()), "closed", 0),
         "sealed": (sealed(), "closed", 0),
         "stalled": (stalled(), "closed", 0),
+        "imaged": (imaged(), "closed", 0),
         "named": (odd, "closed", 0),
         "recovered": (whole, "closed", 0),
         "anchored": (witnessed, "closed", 2),

@@ -64,6 +64,8 @@ from rtshcua.onboard.ports import Command, Event, StatusText
 HEARTBEAT_US = 1_000_000
 #: how often a heard autopilot is asked for its identity
 WHO_US = 200_000
+#: how long cameras have to answer how many images they have taken, before a landing
+LISTED_US = 2_000_000
 #: how long an obstacle that waiting cannot remove must persist before it is reported: somebody may be correcting it
 UNFIT_US = 5_000_000
 #: why a vehicle that signs does not answer unsigned frames
@@ -155,6 +157,7 @@ class Driver:
         self.link = VehicleLink(frames, verifier, system)
         self._gate_may_be_lost = frames.may_be_lost
         self.source = SourceTime()
+        self._lists_images_us: int | None = None  # when the expected images are told once more
         #: the images that cameras report
         self.images = ImageObserver(slack)
         #: the last observed state of the vehicle
@@ -329,6 +332,9 @@ class Driver:
         if not self._was_ready:
             self._judge_readiness(now_us, events)
         self._tell_notes(now_us, events)
+        if self._lists_images_us is not None and now_us >= self._lists_images_us:
+            self._lists_images_us = None
+            events += self.images.expected_images(now_us)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         frames = self._pack(send, now_us, events) if send else []
@@ -426,6 +432,8 @@ class Driver:
         send: list[Message] = []
         if command.kind in (MotionKind.HOME, MotionKind.LAND):  # while it can still go back for what is missing
             events += self.images.expected_images(now_us)
+            send += self._ask_images(self.images.ask_all(self.system))
+            self._lists_images_us = now_us + LISTED_US
         self._advance(now_us, send, events)
         return events, self._pack(send, now_us, events)
 

@@ -17,12 +17,12 @@ from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.geometry.shapes import MultiPolygon, parts
-from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, survey
 from rtshcua.ground.lower.conditions import ConditionPlace
 from rtshcua.ground.lower.contracts import cells_of, recorded
 from rtshcua.ground.lower.fixed_tables import FixedTables, knows_zone
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.policy_checks import check_step_fitted
+from rtshcua.ground.lower.survey_plan import survey_plan
 from rtshcua.ground.lower.tables import JointSourceTable, SourceTable
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, SourceKind
@@ -33,6 +33,20 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
 from rtshcua.model.ir.skills import SkillDecl
+
+#: what an area needs for a pattern
+_NEEDED = {
+    "corridor": "declare the zone as in `corridor(a, b, c, width 40 m)`, or use a `grid`",
+    "face": "declare the zone along the face, as in `corridor(a, b, width 60 m)`: the path is left of `a` to `b`",
+    "around": "leave the structure out of the zone, as in `difference(circle(a, 60 m), circle(a, 8 m))`",
+}
+_EDGE = "the path stays the vehicle's position error away from the edge"
+#: what to do if an area has too little room for a pattern
+_ROOM = dict.fromkeys(("grid", "perimeter", "orbit"), f"use a `perimeter`, which needs the least room; {_EDGE}") | {
+    "corridor": f"declare a wider corridor; {_EDGE}",
+    "face": f"declare a wider corridor, or fly nearer to the face; {_EDGE}",
+    "around": f"declare a larger zone around the structure, or fly nearer to it; {_EDGE}",
+}
 
 
 class LoweredMission(NamedTuple):
@@ -311,21 +325,19 @@ class StepLowering:
         self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int
     ) -> tuple[int, ...] | None:
         """Return the survey path of a `cover` motion, or None after a finding."""
-        assert skill.motion is not None
-        names = [parameter.name.text for parameter in skill.parameters]
-        zone = bound[names.index(_target(skill))]
-        assert isinstance(zone, ZoneDecl)
-        pattern = DEFAULT_PATTERN
-        if skill.motion.pattern is not None:
-            at = names.index(skill.motion.pattern.text)
-            ordinal = bound[at]
-            assert isinstance(ordinal, int)
-            pattern = skill.parameters[at].choices[ordinal].text
-        region = self._under.zones.regions[self._under.zones.index[zone.name.text]]
-        start = None if zone.entry is None else self._under.zones.place(zone.entry)
-        points = survey(region.shape, pattern, altitude, self._under.policy.vehicle.position_error, start)
+        plan = survey_plan(skill, bound, altitude, self._under.zones, self._under.vehicle)
+        zone, shape, pattern = plan.zone, plan.shape, plan.pattern
+        if plan.missing:
+            self._context.report.add(
+                codes.PATTERN_AREA,
+                step.span,
+                f"`{zone.name.text}` {plan.missing}",
+                help=_NEEDED[pattern],
+                labels=[(zone.name.span, "declared here")],
+            )
+            return None
+        points = plan.path(self._under.policy.vehicle.position_error)
         if points is None:
-            shape = region.shape
             several = len(parts(shape)) if isinstance(shape, MultiPolygon) else 1
             self._context.report.add(
                 codes.AREA_TOO_SMALL,
@@ -333,10 +345,7 @@ class StepLowering:
                 f"`{zone.name.text}` has {several} parts, but a survey path covers only one"
                 if several > 1
                 else f"`{zone.name.text}` is too small or too curved for the pattern `{pattern}`",
-                help="declare each part as a zone, and survey one after the other"
-                if several > 1
-                else "use a `perimeter`, which needs the least room; the path stays the vehicle's position error away "
-                "from the edge",
+                help="declare each part as a zone, and survey one after the other" if several > 1 else _ROOM[pattern],
                 labels=[(zone.name.span, "declared here")],
             )
             return None
@@ -363,9 +372,3 @@ def _timed(skills: Contract, own: Overrides) -> Contract:
         phases=tuple(name.text for name in own.phases) or skills.phases,
         record=recorded((*skills.record, *(name.text for name in own.record))),
     )
-
-
-def _target(skill: SkillDecl) -> str:
-    assert skill.motion is not None
-    assert skill.motion.target is not None
-    return skill.motion.target.text

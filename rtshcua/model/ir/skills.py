@@ -4,6 +4,7 @@ from typing import Literal
 
 from rtshcua.model.ir.expression import Condition, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.places import OpticalLength
 
 
 class ParameterDecl(Node):
@@ -31,6 +32,7 @@ class MotionDecl(Node):
     speed: Name | None  # a parameter of type speed
     pattern: Name | None  # a choice parameter
     time: Name | None = None  # a parameter of type duration: `hold for time`
+    distance: Name | None = None  # a parameter of type length: from the structure that a pattern looks at
 
 
 class ArgumentValue(Node):
@@ -97,6 +99,21 @@ class AcceptsDecl(Node):
     arguments: tuple[SourcedArgument, ...]
 
 
+class PicturesDecl(Node):
+    """`pictures by mapper every 10 m resolution 2 cm overlap 80 % forward 70 % side blur 50 % relief 5 m`.
+
+    What the pictures of a survey must show, proved from the vehicle's camera and the planned path, on the ground alone.
+    """
+
+    camera: Name
+    every: Quantity | None  # a length along the path, or a duration
+    resolution: OpticalLength | None  # the most that a pixel may show
+    forward: Quantity | None
+    side: Quantity | None
+    blur: Quantity | None  # the most that a picture may smear, in shares of a pixel
+    relief: Quantity | None  # how far the ground may lie above or below home
+
+
 class Sized(Node):
     """`lasts at most longest`: a part of a contract whose value is one of the skill's sizes."""
 
@@ -108,7 +125,8 @@ class SkillDecl(Node, kw_only=True):
     """A skill contract. None or an empty tuple means: not written (the checker reports the required fields).
 
     `sizes` are numbers that a program may set (`SizesDecl`), each with a default; `sized` are the parts that name
-    one. `checker/symbols.py` substitutes the values, and `sized` is then empty. `accepts` is no part of the contract.
+    one. `checker/symbols.py` substitutes the values, and `sized` is then empty. `accepts` and `pictures` are no part of
+    the contract.
     """
 
     name: Name
@@ -129,6 +147,7 @@ class SkillDecl(Node, kw_only=True):
     sizes: tuple[ParameterDecl, ...] = ()
     sized: tuple[Sized, ...] = ()
     accepts: tuple[AcceptsDecl, ...] = ()
+    pictures: PicturesDecl | None = None
 
 
 class GivenSize(Node):

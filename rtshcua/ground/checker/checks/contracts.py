@@ -22,7 +22,8 @@ from rtshcua.ground.checker.conditions import check_condition
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.checker.types import DURATION, HEIGHT, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.ground.checker.types import DURATION, HEIGHT, LENGTH, POSITION, SPEED, ZONE, Kind, Type
+from rtshcua.ground.geometry.survey import ALL_PATTERNS, SIDEWAYS
 from rtshcua.model.durability import BUFFERED, WORDS, WRITTEN
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.contract import TimingClass
@@ -38,7 +39,7 @@ KINDS = ("intent", "decision", "state", "authorization", "effect")
 #: the words of a `record` clause: kinds of evidence and durabilities
 RECORDS = (*KINDS, *DURABILITIES)
 #: survey patterns of a `cover` motion
-PATTERNS = ("grid", "perimeter", "orbit")
+PATTERNS = ALL_PATTERNS
 
 
 def check_contracts(context: CheckContext) -> None:
@@ -100,6 +101,7 @@ def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
     _parameter(context, skill, motion.altitude, HEIGHT)
     _parameter(context, skill, motion.speed, SPEED)
     _parameter(context, skill, motion.time, DURATION)
+    _parameter(context, skill, motion.distance, LENGTH)
     _parameter(context, skill, motion.target, ZONE if motion.kind == "cover" else POSITION)
     if motion.kind == "fly" and motion.target is not None:
         first = next((p for p in skill.parameters if p.type.text == "position"), None)
@@ -117,6 +119,14 @@ def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
         else:
             for choice in argument.declaration.choices:
                 one_of(context, codes.BAD_MOTION, choice, PATTERNS, "survey pattern")
+                if choice.text in SIDEWAYS and motion.distance is None:
+                    context.report.add(
+                        codes.BAD_MOTION,
+                        choice.span,
+                        f"the pattern `{choice.text}` needs a distance from the structure, and the motion names none",
+                        help="add a parameter such as `away: length in 5 m .. 30 m`, and `distance away` to the motion",
+                        labels=[(motion.span, "the motion")],
+                    )
 
 
 def _parameter(context: CheckContext, skill: SkillDecl, name: Name | None, type: Type) -> None:

@@ -18,6 +18,7 @@ from rtshcua.model.ir.skills import (
     LinkDecl,
     MotionDecl,
     ParameterDecl,
+    PicturesDecl,
     Sized,
     SizesDecl,
     SkillDecl,
@@ -57,7 +58,7 @@ def _clauses_of(reader: Reader, span: Span, condition: Condition, fitted: bool |
 FORMS: dict[str, Action] = {
     "climb_to": part("motion", node(MotionDecl, "altitude", kind="climb")),
     "fly_to": part("motion", node(MotionDecl, "target", "altitude", "speed", kind="fly")),
-    "cover_area": part("motion", node(MotionDecl, "target", "altitude", "pattern", "speed", kind="cover")),
+    "cover_area": part("motion", node(MotionDecl, "target", "altitude", "distance", "pattern", "speed", kind="cover")),
     "hold_for": part("motion", node(MotionDecl, "kind", "time")),
     "stay": part("motion", node(MotionDecl, "kind")),
     "timing_class": part("class"),
@@ -70,6 +71,9 @@ FORMS: dict[str, Action] = {
     "fallback": part("fallback"),
     "energy": part("energy"),
     "record": part("record"),
+    "pictures": part(
+        "pictures", node(PicturesDecl, "camera", "every", "resolution", "forward", "side", "blur", "relief")
+    ),
     "links": several,
     "link": node(LinkDecl, "skill", "arguments", "limit", arguments=()),
     "given_size": node(GivenSize, "name", "value"),
@@ -260,6 +264,7 @@ def skill(
             sizes=sizes or (),
             sized=tuple(amount for amount in amounts.values() if isinstance(amount, Sized)),
             accepts=tuple(found["accepts"]),
+            pictures=found.get("pictures"),
         ),
         name,
     )

@@ -37,6 +37,7 @@ class NameUse(Enum):
     CLASS = "class"
     RECORD = "record"
     PHASE = "phase"
+    CAMERA = "camera"
     TYPE = "type"
     MESSAGE = "message"
     PARAMETER = "parameter"
@@ -152,7 +153,7 @@ def name_use(written: list[Token]) -> NameUse:
 #: the keywords at which an `accepts` before the cursor has ended
 _OTHER_PARTS = frozenset(
     ("motion", "class", "deadline", "valid", "lasts", "grace", "require", "assume", "maintain", "fallback", "energy",
-     "record", "{", "}")
+     "record", "pictures", "{", "}")
 )  # fmt: skip
 
 
@@ -201,6 +202,10 @@ def _behind_word(written: list[Token], at: int) -> NameUse:
     if word == "on":
         header = written[0].text == "mission" and all(token.text != "{" for token in written)
         return NameUse.VEHICLE if header or written[0].text == "nominal" else NameUse.DAY
+    if word == "by" and before_it == "pictures":
+        return NameUse.CAMERA
+    if word == "distance" and written[0].text == "skill":
+        return NameUse.PARAMETER
     if word == "flies" and before_it == "expect":
         return NameUse.SKILL
     return NameUse.ZONE if word == "to" and before_it == "distance" else _BEHIND[word]

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.ground.geometry.polygons import Point, Segment, interpolate, meet, scaled
 from rtshcua.ground.geometry.projection import CONTEXT, PI, sine_of
+from rtshcua.model.flat.limits import FULL
 
 #: a whole turn, in 1/100 degree
 TURN: Final = 36_000
@@ -66,6 +67,14 @@ def levels(lowest: int, highest: int, spacing: int) -> tuple[int, ...]:
     return (
         tuple(lowest + (highest - lowest) * number // count for number in range(count + 1)) if count > 0 else (lowest,)
     )
+
+
+def face_levels(lowest: int, highest: int, extent: int, overlap: int) -> tuple[int, ...]:
+    """Return the heights of the passes over a face, whose pictures of this extent upwards overlap by a share.
+
+    `extent` is in mm, rounded down, and `overlap` in 1/10000, below 10000.
+    """
+    return levels(lowest, highest, max(extent * (FULL - overlap) // FULL, 1))
 
 
 def orbit(centre: Point, radius: int, heights: Sequence[int], legs: int) -> list[ViewPoint]:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from rtshcua.ground.geometry.inspection import (
     TURN,
     CentreLine,
+    face_levels,
     face_scan,
     heading,
     levels,
@@ -111,6 +112,13 @@ def test_lines_stay_in_their_corridor_and_are_evenly_spaced(
     gaps = [math.dist(one[0], two[0]) for one, two in pairwise(first)]
     assert all(gap <= 2 * (half - inset) / len(found) + 2 for gap in gaps)
     assert len(found) == 256 or all(gap <= spacing + 2 for gap in gaps)
+
+
+@given(st.integers(0, 90_000), st.integers(500, 90_000), st.integers(500, 60_000), st.integers(0, 9_900))
+def test_passes_over_a_face_overlap_upwards(lowest: int, tall: int, extent: int, overlap: int) -> None:
+    found = face_levels(lowest, lowest + tall, extent, overlap)
+    assert (found[0], found[-1]) == (lowest, lowest + tall)
+    assert all(10_000 * (extent - (b - a)) >= overlap * extent for a, b in pairwise(found))
 
 
 def test_reach_of_a_ring_encloses_it() -> None:

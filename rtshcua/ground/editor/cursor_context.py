@@ -90,6 +90,11 @@ _BEHIND = {
     "never": NameUse.SKILL, "lands": NameUse.ZONE, "distance": NameUse.ZONE,
 }  # fmt: skip
 
+#: the use of a name after two keywords
+_BEHIND_TWO = {
+    ("pictures", "by"): NameUse.CAMERA, ("expect", "flies"): NameUse.SKILL, ("distance", "to"): NameUse.ZONE,
+}  # fmt: skip
+
 
 def last_declaration_start(text: ParsedText, offset: int) -> int:
     """The start of the last declaration before an offset at which the parser may start."""
@@ -202,13 +207,9 @@ def _behind_word(written: list[Token], at: int) -> NameUse:
     if word == "on":
         header = written[0].text == "mission" and all(token.text != "{" for token in written)
         return NameUse.VEHICLE if header or written[0].text == "nominal" else NameUse.DAY
-    if word == "by" and before_it == "pictures":
-        return NameUse.CAMERA
     if word == "distance" and written[0].text == "skill":
         return NameUse.PARAMETER
-    if word == "flies" and before_it == "expect":
-        return NameUse.SKILL
-    return NameUse.ZONE if word == "to" and before_it == "distance" else _BEHIND[word]
+    return _BEHIND_TWO.get((before_it, word), _BEHIND[word])
 
 
 def _of_signal(written: list[Token], head: str) -> NameUse:

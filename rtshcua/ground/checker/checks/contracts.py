@@ -102,6 +102,7 @@ def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
     _parameter(context, skill, motion.speed, SPEED)
     _parameter(context, skill, motion.time, DURATION)
     _parameter(context, skill, motion.distance, LENGTH)
+    _distance(context, skill, motion.distance)
     _parameter(context, skill, motion.target, ZONE if motion.kind == "cover" else POSITION)
     if motion.kind == "fly" and motion.target is not None:
         first = next((p for p in skill.parameters if p.type.text == "position"), None)
@@ -135,6 +136,16 @@ def _parameter(context: CheckContext, skill: SkillDecl, name: Name | None, type:
     argument = context.arguments(skill).get(name.text)
     if argument is None or argument.type != type:
         _not_parameter(context, skill, name, type.describe())
+
+
+def _distance(context: CheckContext, skill: SkillDecl, name: Name | None) -> None:
+    """Report a distance from a structure that may be negative."""
+    argument = None if name is None else context.arguments(skill).get(name.text)
+    range = None if argument is None else argument.declaration.range
+    if argument is not None and range is not None and argument.type == LENGTH and (argument.low or 0) < 0:
+        context.report.add(
+            codes.NOT_POSITIVE, range.low.span, f"`{context.report.text(range.low.span)}` must not be negative"
+        )
 
 
 def _not_parameter(context: CheckContext, skill: SkillDecl, name: Name, expected: str) -> None:

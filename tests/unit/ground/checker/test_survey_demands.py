@@ -71,6 +71,8 @@ def test_invalid_cameras_are_reported(old: str, new: str, codes: list[str]) -> N
         ("relief 2 m", "relief 0 m", []),
         ("relief 2 m", "relief 2 s", ["E0310"]),
         ("distance away ", "", ["E0608", "E0608"]),
+        ("3 m .. 20 m", "0 m .. 20 m", []),
+        ("3 m .. 20 m", "-1 m .. 20 m", ["E0319"]),
         ("distance away", "distance altitude", ["E0608"]),
         ("grid, face", "grid, facade", ["E0608"]),
         ("motion cover area at altitude distance away pattern pattern", "motion home", ["E1706"]),

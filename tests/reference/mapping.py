@@ -34,7 +34,12 @@ skill look(
   away:     length in 8 m .. 15 m = 10 m,
   pattern:  one of grid, perimeter, corridor = grid,
   speed:    speed in 1 m/s .. 8 m/s = 5 m/s,
-) sizes (highest: altitude in 20 m .. 100 m = 60 m) {
+) sizes (
+  highest: altitude in 20 m .. 100 m = 60 m,
+  apart:   length in 1 m .. 20 m = 8 m,
+  pixel:   length in 1 mm .. 10 cm = 2 cm,
+  share:   ratio in 0 % .. 90 % = 80 %,
+) {
   motion   cover area at altitude distance away pattern pattern speed speed
   class    tactical  deadline 5 s  valid for 90 min  lasts at most 25 min
   pictures by mapper every 8 m resolution 2 cm overlap 80 % forward 70 % side blur 100 %

@@ -102,10 +102,11 @@ def faults(flown: SurveyRange, pictures: PicturesDecl) -> Iterator[PictureFault]
     every = pictures.every
     if every is not None:
         yield from _interval(camera, speed, every.value, every.dimension)
-    if pictures.resolution is not None and far > camera.farthest(pictures.resolution.value):
-        shows, most = micrometres(_pixel_um(camera, far)), micrometres(pictures.resolution.value)
+    resolution = pictures.resolution_um
+    if resolution is not None and far > camera.farthest(resolution):
+        shows, most = micrometres(_pixel_um(camera, far)), micrometres(resolution)
         found = f"a pixel may show {shows}, more than {most}"
-        farthest = _rounded(camera.farthest(pictures.resolution.value) - flown.relief, Dimension.LENGTH)
+        farthest = _rounded(camera.farthest(resolution) - flown.relief, Dimension.LENGTH)
         yield PictureFault(codes.COARSE_PICTURES, "resolution", found, "distance", farthest)
     forward, kept = pictures.forward, _forward(camera, near, speed, pictures)
     if every is not None and forward is not None and kept is not None and kept < forward.value:

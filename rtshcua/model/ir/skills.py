@@ -107,17 +107,28 @@ class PicturesDecl(Node):
 
     camera: Name
     every: Quantity | None  # a length along the path, or a duration
-    resolution: OpticalLength | None  # the most that a pixel may show
+    resolution: OpticalLength | Quantity | None  # the most that a pixel may show; a length if it is a size
     forward: Quantity | None
     side: Quantity | None
     blur: Quantity | None  # the most that a picture may smear, in shares of a pixel
     relief: Quantity | None  # how far the ground may lie above or below home
 
+    @property
+    def resolution_um(self) -> int | None:
+        """The resolution in um."""
+        written = self.resolution
+        if written is None:
+            return None
+        return written.value if isinstance(written, OpticalLength) else written.value * 1_000
+
 
 class Sized(Node):
-    """`lasts at most longest`: a part of a contract whose value is one of the skill's sizes."""
+    """`lasts at most longest`: a part of a contract, or of its `pictures`, whose value is one of the skill's sizes."""
 
-    part: Literal["deadline", "validity", "duration", "grace", "energy"]
+    part: Literal[
+        "deadline", "validity", "duration", "grace", "energy",
+        "every", "resolution", "forward", "side", "blur", "relief",
+    ]  # fmt: skip
     size: Reference
 
 

@@ -49,6 +49,8 @@ def _camera(context: CheckContext, camera: CameraDecl) -> None:
 def _pictures(context: CheckContext, skill: SkillDecl, pictures: PicturesDecl) -> None:
     every = pictures.every
     quantity(context, every, Dimension.DURATION if _is_time(every) else Dimension.LENGTH)
+    if isinstance(pictures.resolution, Quantity):
+        quantity(context, pictures.resolution, Dimension.LENGTH)
     quantity(context, pictures.relief, Dimension.LENGTH, positive=False)
     quantity(context, pictures.blur, Dimension.RATIO, most=MOST_BLUR)
     for share in (pictures.forward, pictures.side):
@@ -61,7 +63,8 @@ def _pictures(context: CheckContext, skill: SkillDecl, pictures: PicturesDecl) -
             help="write `pictures` in a skill whose motion is `cover`",
             labels=[(skill.motion.span, "the motion")],
         )
-    if every is None and pictures.forward is not None and pictures.forward.value:
+    spaced = every is not None or any(each.part == "every" for each in skill.sized)
+    if not spaced and pictures.forward is not None and pictures.forward.value:
         context.report.add(
             codes.BAD_PICTURES,
             pictures.forward.span,

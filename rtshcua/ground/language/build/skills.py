@@ -71,9 +71,6 @@ FORMS: dict[str, Action] = {
     "fallback": part("fallback"),
     "energy": part("energy"),
     "record": part("record"),
-    "pictures": part(
-        "pictures", node(PicturesDecl, "camera", "every", "resolution", "forward", "side", "blur", "relief")
-    ),
     "links": several,
     "link": node(LinkDecl, "skill", "arguments", "limit", arguments=()),
     "given_size": node(GivenSize, "name", "value"),
@@ -219,6 +216,20 @@ def sized(reader: Reader, span: Span, word: str, size: Reference, phases: tuple[
     return Part(str(word), span, (made, phases or ()) if word == "valid" else made)
 
 
+#: the parts of `pictures`, in their order
+_SHOWN: Final = ("every", "resolution", "forward", "side", "blur", "relief")
+
+
+def pictures(reader: Reader, span: Span, camera: Name, *shown: Any) -> Part:
+    """`pictures by mapper every 10 m resolution finest overlap 80 % forward 70 % side`."""
+    reader.undotted(camera, "camera")
+    written = dict(zip(_SHOWN, shown, strict=True))
+    sized = [Sized(span=each.span, part=name, size=each) for name, each in written.items()  # type: ignore[arg-type]
+             if isinstance(each, Reference)]  # fmt: skip
+    plain = {name: None if isinstance(each, Reference) else each for name, each in written.items()}
+    return Part("pictures", span, (PicturesDecl(span=span, camera=camera, **plain), tuple(sized)))
+
+
 def own_sizes(reader: Reader, span: Span, parameters: tuple[ParameterDecl, ...]) -> tuple[ParameterDecl, ...]:
     """`sizes (highest: altitude in 10 m .. 500 m = 60 m)`, of a skill."""
     return parameters
@@ -243,6 +254,7 @@ def skill(
     validity, phases = found.get("valid", (None, ()))
     amounts = {"validity": validity} | {part: found.get(word) for word, part in _SIZED.items() if word != "valid"}
     plain = {part: None if isinstance(amount, Sized) else amount for part, amount in amounts.items()}
+    shown, sized_shown = found.get("pictures", (None, ()))
     reader.declare(
         SkillDecl(
             span=span,
@@ -262,9 +274,9 @@ def skill(
             energy=plain["energy"],
             record=found.get("record", ()),
             sizes=sizes or (),
-            sized=tuple(amount for amount in amounts.values() if isinstance(amount, Sized)),
+            sized=(*(amount for amount in amounts.values() if isinstance(amount, Sized)), *sized_shown),
             accepts=tuple(found["accepts"]),
-            pictures=found.get("pictures"),
+            pictures=shown,
         ),
         name,
     )

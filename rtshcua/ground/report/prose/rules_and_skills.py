@@ -12,7 +12,6 @@ from rtshcua.ground.report.prose.phrases import (
     listed,
     name,
     named,
-    optical,
     sentence,
 )
 from rtshcua.model.durability import WORDS as DURABILITIES
@@ -33,7 +32,7 @@ from rtshcua.model.ir.skills import (
     SourcedArgument,
     Substitute,
 )
-from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.quantity import Dimension, display, micrometres
 
 _TYPES: Final = {
     "zone": "a zone",
@@ -142,8 +141,8 @@ def describe_pictures(pictures: PicturesDecl | None) -> str:
         return ""
     every = "" if pictures.every is None else f" every {display(pictures.every.value, pictures.every.dimension)}"
     kept = []
-    if pictures.resolution is not None:
-        kept.append(f"a pixel shows at most {optical(pictures.resolution)}")
+    if pictures.resolution_um is not None:
+        kept.append(f"a pixel shows at most {micrometres(pictures.resolution_um)}")
     if pictures.forward is not None and pictures.side is not None:
         along, beside = _share(pictures.forward), _share(pictures.side)
         kept.append(f"pictures overlap by {along} along the path and {beside} beside it")

@@ -84,6 +84,9 @@ def step(*changes: tuple[str, str]) -> StepPictures:
         ([*SIDEWAYS, ("15 m", "14 m"), ("8.5467 E, width 60 m", "8.5467 E, width 20 m"), ("field, 50", "wall, 50")],
          "E0509", "look(wall, 50 m)",
          "`wall` is too small or too curved for the pattern `face`", "declare a wider corridor"),
+        ([*SIDEWAYS, ("15 m", "14 m"), ("8.5460 E, 40 m", "8.5460 E, 19 m"),
+          ("field, 50 m", "tower, 50 m, 14 m, around")], "E0509", "look(tower, 50 m, 14 m, around)",
+         "`tower` is too small or too curved for the pattern `around`", "declare a larger zone around the structure"),
     ],
 )  # fmt: skip
 def test_demand_that_is_not_kept_is_refused_with_the_nearest_value(
@@ -104,6 +107,11 @@ def test_demand_that_is_not_kept_is_refused_with_the_nearest_value(
 
 def test_program_of_these_tests_is_accepted() -> None:
     assert findings(PROGRAM) == ()
+
+
+def test_step_of_a_refused_contract_is_not_reported_again() -> None:
+    far = [*SIDEWAYS, ("15 m", "18 m"), ("field, 50 m", "barn, 50 m, 18 m, around")]
+    assert [each.message[:7] for each in findings(program(*far)) if each.code.id == "E1702"] == ["at 18 m"]
 
 
 def test_lines_that_do_not_fit_on_a_path_are_refused() -> None:

@@ -14,7 +14,7 @@ from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.solve import may_match
-from rtshcua.ground.lower.signed_paths import PlannedPath, path_planned_otherwise
+from rtshcua.ground.lower.signed_paths import PlannedPath, other_spacing, path_planned_otherwise
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.step_number import index_of, number_of
 from rtshcua.wire.approval import ApprovalDocument, confirms, sign_approval
@@ -39,13 +39,14 @@ class ApprovalRequest(NamedTuple):
 
 class ApprovalDraft(NamedTuple):
     """An answer before it is signed, the verified bundle and its step; `planned` is the planner's path where the
-    mission has another.
+    mission has another, `spacing` the distance in mm of the lines of a grid that a camera determines.
     """
 
     document: ApprovalDocument
     bundle: Bundle
     step: Invocation
     planned: PlannedPath | None
+    spacing: int | None
 
 
 class ApprovalSigner(NamedTuple):
@@ -89,7 +90,8 @@ def _draft(request: ApprovalRequest, now_us: int) -> ApprovalDraft | Refusal:
         vehicle=flying.policy.vehicle.identity, role=role, granted=int(not request.refused), issued_at_us=now_us,
         expires_at_us=now_us + request.seconds * 1_000_000,
     )  # fmt: skip
-    return ApprovalDraft(document, flying, about, path_planned_otherwise(flying.policy, about))
+    planned, spacing = path_planned_otherwise(flying.policy, about), other_spacing(flying.policy, about)
+    return ApprovalDraft(document, flying, about, planned, spacing)
 
 
 def sign_draft(draft: ApprovalDraft, signer: ApprovalSigner) -> bytes | Refusal:

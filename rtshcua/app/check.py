@@ -14,6 +14,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.prove.mission_bounds import Bounds
+from rtshcua.ground.prove.survey_quality import StepPictures
 from rtshcua.ground.report.policy_changes import describe_changes
 from rtshcua.ground.report.report_model import ChangeView
 from rtshcua.ground.versions.raised import compare
@@ -41,11 +42,12 @@ class CheckRequest(NamedTuple):
 
 
 class CheckedMission(NamedTuple):
-    """The bounds of a mission, and the file that declares it."""
+    """The bounds of a mission, the file that declares it, and the pictures of its surveys."""
 
     name: str
     file: str
     bounds: Bounds
+    pictures: tuple[StepPictures, ...] = ()
 
 
 class LeftOutCounts(NamedTuple):
@@ -215,7 +217,7 @@ def check_all(
             now |= {(one.code, one.span, one.message): one for one in wrong}
         files = {mission.name.text: unit.file for unit in program.units for mission in unit.missions}
         for name, bounds in checked.bounds.items():
-            missions.setdefault((files[name], name), CheckedMission(name, files[name], bounds))
+            missions.setdefault((files[name], name), CheckedMission(name, files[name], bounds, checked.pictures[name]))
     return CheckResult(
         tuple(found.values()),
         sources,

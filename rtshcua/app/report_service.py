@@ -165,5 +165,13 @@ def _part(asked: RootProgram, checked: Checked, trials: _Trials) -> ReportPart:
             name = mission.name.text
             compiled = compile_program(program, dialect.load(), mission=name, issued_at_us=0)
             if compiled.policy is not None and compiled.mission is not None:
-                flown.append(CompiledMission(compiled.policy, compiled.mission, mission, checked.bounds.get(name)))
+                flown.append(
+                    CompiledMission(
+                        compiled.policy,
+                        compiled.mission,
+                        mission,
+                        checked.bounds.get(name),
+                        checked.pictures.get(name, ()),
+                    )
+                )
     return ReportPart(program, checked.policies, tuple(flown), checked.diagnostics, tuple(tried), tuple(scenarios))

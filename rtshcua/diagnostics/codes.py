@@ -298,3 +298,12 @@ UNREAD_TRIGGER = _code("E1607", "unread-trigger", "a fault's trigger reads a sig
 BAD_START = _code("E1608", "bad-start", "invalid start of a scenario")
 FLIGHT_FAILED = _code("E1610", "flight-failed", "a scenario's flight failed, or differs from what was expected")
 NO_SUCH_ROLE = _code("E1609", "no-such-role", "an answer is given for a role that the policy does not declare")
+
+# E17: cameras and pictures
+UNKNOWN_CAMERA = _code("E1701", "unknown-camera", "a skill takes pictures with a camera that the vehicle lacks")
+COARSE_PICTURES = _code("E1702", "coarse-pictures", "a pixel may show more than a skill's `resolution`")
+SMALL_OVERLAP = _code("E1703", "small-overlap", "pictures may overlap less than a skill demands")
+HASTY_PICTURES = _code("E1704", "hasty-pictures", "pictures are due faster than the camera can take them")
+BLURRED_PICTURES = _code("E1705", "blurred-pictures", "pictures may smear more than a skill permits")
+BAD_PICTURES = _code("E1706", "bad-pictures", "a skill demands pictures that its motion cannot take")
+PATTERN_AREA = _code("E1707", "pattern-area", "an area lacks the line or the structure that a survey pattern needs")

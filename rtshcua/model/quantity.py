@@ -96,3 +96,8 @@ def _decimal(value: int, denominator: int) -> str:
     whole, rest = divmod(abs(value), denominator)
     fraction = str(rest).zfill(digits).rstrip("0")
     return f"{'-' if value < 0 else ''}{whole}{'.' + fraction if fraction else ''}"
+
+
+def micrometres(value: int) -> str:
+    """Return a length in um as text, in mm where it is at least as large: exact up to the um."""
+    return f"{value} um" if value < 1_000 else f"{_decimal(value, 1_000)} mm"

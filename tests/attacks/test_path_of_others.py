@@ -13,6 +13,8 @@ from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
+from rtshcua.ground.geometry.shapes import shape_of
+from rtshcua.ground.geometry.survey import PathAim, survey
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.wire import cose, names
@@ -94,6 +96,24 @@ def test_planner_path_needs_no_extra_confirmation(sign: Sign, capsys: pytest.Cap
     assert main([*APPROVE]) == ExitCode.OK
     said = capsys.readouterr()
     assert "planner" not in said.out + said.err
+
+
+def one_line(one: Invocation, policy: Policy) -> Invocation:
+    """A grid of one line over the whole zone, as if for a camera that sees all of it at once."""
+    arguments = (*one.arguments[:2], 0, *one.arguments[3:])
+    shape = shape_of(policy.zones[arguments[0]])
+    assert shape is not None
+    path = survey(shape, "grid", 9_000, policy.vehicle.position_error, None, PathAim(spacing=10**6))
+    assert path is not None
+    assert len(path) == 2
+    flat = tuple(coordinate for point in path for coordinate in point)
+    return replace(one, arguments=arguments, plan=replace(one.plan, path=flat))
+
+
+def test_sparse_grid_is_told_with_its_spacing(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+    sign(one_line)
+    main([*APPROVE])
+    assert "its grid has a line every " in capsys.readouterr().err
 
 
 def test_any_path_counts_as_changed_without_planner_path(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,7 @@ from rtshcua.ground.checker.checks.premises import check_nominals
 from rtshcua.ground.checker.checks.roles import check_roles
 from rtshcua.ground.checker.checks.scenarios import check_scenarios
 from rtshcua.ground.checker.checks.signals import check_signals
+from rtshcua.ground.checker.checks.survey_demands import check_survey_demands
 from rtshcua.ground.checker.checks.tests import check_tests
 from rtshcua.ground.checker.checks.times import check_times
 from rtshcua.ground.checker.checks.vehicles import check_vehicles
@@ -32,6 +33,7 @@ CHECKS = (
     check_records,
     check_durability,
     check_accepts,
+    check_survey_demands,
     check_nominals,
     check_tests,
     check_scenarios,

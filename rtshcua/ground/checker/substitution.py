@@ -13,7 +13,7 @@ from rtshcua.model.ir.expression import Arithmetic, Quantity, Reference, Value
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.ir.policies import RuleDecl
-from rtshcua.model.ir.skills import SizesDecl, SkillDecl
+from rtshcua.model.ir.skills import PicturesDecl, SizesDecl, SkillDecl
 
 N = TypeVar("N", bound=Node)
 
@@ -102,6 +102,9 @@ def sized(skill: SkillDecl, given: SizesDecl | None) -> SkillDecl:
         if each.size.name in values
     }
     rest = tuple(each for each in skill.sized if each.part not in named)
+    if plain.pictures is not None:
+        shown = {part: named.pop(part) for part in PicturesDecl.__struct_fields__ if part in named}
+        plain = plain.copied(pictures=plain.pictures.copied(**shown))
     return plain.copied(sizes=skill.sizes, sized=rest, **named)
 
 

@@ -77,7 +77,8 @@ def picture(title: str, sheets: Sequence[PictureSheet]) -> str:
         placed.append(one)
     told = " ".join(text for sheet in sheets for text in (sheet.title + ".", *sheet.above))
     text = environment.get_template("picture.svg").render(
-        title=title, description=told, style=Markup(_style()), sheets=placed, width=WIDTH, height=round(y), edge=_EDGE
+        title=title, description=told, style=Markup(drawing_style()), sheets=placed, width=WIDTH, height=round(y),
+        edge=_EDGE,
     )  # fmt: skip
     return visibly(text)
 
@@ -137,7 +138,7 @@ def _lines(text: str, share: float = 1.0) -> list[str]:
 
 
 @cache
-def _style() -> str:
+def drawing_style() -> str:
     """The style of drawings, with the values of its variables: those of a light page, and those of a dark one."""
     environment, _ = templates(OWN)
     assert environment.loader is not None

@@ -193,8 +193,9 @@ class _Proposals:
             NameUse.SKILL: symbols.skills, NameUse.ZONE: symbols.zones, NameUse.POLICY: symbols.policies,
             NameUse.VEHICLE: symbols.vehicles, NameUse.TEMPLATE: symbols.templates, NameUse.SIGNAL: symbols.signals,
             NameUse.CLASS: CLASSES, NameUse.RECORD: RECORDS, NameUse.SOURCE: SOURCES, NameUse.REASON: REASONS,
-            NameUse.ROLE: (OPERATOR, *symbols.roles), NameUse.PHASE: self._all(NameKind.PHASE), NameUse.MESSAGE:
-            self.dialect.messages, NameUse.DIALECT_ENUM: self.dialect.enums, NameUse.TYPE: (*TYPES, *symbols.enums),
+            NameUse.ROLE: (OPERATOR, *symbols.roles), NameUse.PHASE: self._all(NameKind.PHASE),
+            NameUse.CAMERA: self._all(NameKind.CAMERA), NameUse.MESSAGE: self.dialect.messages,
+            NameUse.DIALECT_ENUM: self.dialect.enums, NameUse.TYPE: (*TYPES, *symbols.enums),
             NameUse.MISSION: symbols.missions, NameUse.AUTOPILOT: FLAVOURS, NameUse.ENDING: ENDS,
             NameUse.DAY: DAYS, NameUse.NOTHING: (),
             NameUse.NOMINAL: [each.name.text for unit in self.view.units.values() for each in unit.nominals],

@@ -37,6 +37,7 @@ class NameUse(Enum):
     CLASS = "class"
     RECORD = "record"
     PHASE = "phase"
+    CAMERA = "camera"
     TYPE = "type"
     MESSAGE = "message"
     PARAMETER = "parameter"
@@ -87,6 +88,11 @@ _BEHIND = {
     "nominal": NameUse.NOTHING, "phase": NameUse.NOTHING,
     "flies": NameUse.MISSION, "aboard": NameUse.AUTOPILOT, "ends": NameUse.ENDING, "after": NameUse.SKILL,
     "never": NameUse.SKILL, "lands": NameUse.ZONE, "distance": NameUse.ZONE,
+}  # fmt: skip
+
+#: the use of a name after two keywords
+_BEHIND_TWO = {
+    ("pictures", "by"): NameUse.CAMERA, ("expect", "flies"): NameUse.SKILL, ("distance", "to"): NameUse.ZONE,
 }  # fmt: skip
 
 
@@ -152,7 +158,7 @@ def name_use(written: list[Token]) -> NameUse:
 #: the keywords at which an `accepts` before the cursor has ended
 _OTHER_PARTS = frozenset(
     ("motion", "class", "deadline", "valid", "lasts", "grace", "require", "assume", "maintain", "fallback", "energy",
-     "record", "{", "}")
+     "record", "pictures", "{", "}")
 )  # fmt: skip
 
 
@@ -201,9 +207,9 @@ def _behind_word(written: list[Token], at: int) -> NameUse:
     if word == "on":
         header = written[0].text == "mission" and all(token.text != "{" for token in written)
         return NameUse.VEHICLE if header or written[0].text == "nominal" else NameUse.DAY
-    if word == "flies" and before_it == "expect":
-        return NameUse.SKILL
-    return NameUse.ZONE if word == "to" and before_it == "distance" else _BEHIND[word]
+    if word == "distance" and written[0].text == "skill":
+        return NameUse.PARAMETER
+    return _BEHIND_TWO.get((before_it, word), _BEHIND[word])
 
 
 def _of_signal(written: list[Token], head: str) -> NameUse:

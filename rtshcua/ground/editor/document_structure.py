@@ -125,7 +125,7 @@ _BY_DECLARATION: Final = {
 }  # fmt: skip
 _BY_NAME_KIND: Final = {
     NameKind.PARAMETER: "parameter", NameKind.MEMBER: "enumMember", NameKind.CHOICE: "enumMember",
-    NameKind.PHASE: "property",
+    NameKind.PHASE: "property", NameKind.CAMERA: "property",
     NameKind.ROLE: "type", NameKind.SOURCE: "enumMember", NameKind.CLASS: "enumMember", NameKind.RECORD: "enumMember",
     NameKind.TYPE: "type", NameKind.MESSAGE: "struct", NameKind.FIELD: "property", NameKind.DIALECT_ENUM: "enum",
     NameKind.REASON: "enumMember", NameKind.WORD: "keyword", NameKind.FAULT: "function",

@@ -25,6 +25,8 @@ KEYWORDS: Mapping[str, str] = {
     "entry": "A place in the zone to fly to: `name.entry`.",
     "active": "The zone only exists between these times, every day or `on monday .. friday`.",
     "vehicle": "The properties of an aircraft that the checks use; signed with the policy.",
+    "camera": "A camera of the vehicle: sensor, focal length, pixels, shortest interval, longest exposure; `portrait` "
+    "if the sensor's width is along the flight.",
     "home": "The place where the vehicle starts; `within` is the greatest distance of the real start from it.",
     "skill": "Something that the vehicle can do, and its contract.",
     "motion": "Where the skill takes the vehicle, so that its path is planned before the flight.",
@@ -41,6 +43,8 @@ KEYWORDS: Mapping[str, str] = {
     "record": "The kinds of evidence that are written, and their durability before the command is sent.",
     "accepts": "A command, mission `item`, `message` or flight `mode` of MAVLink by which a client of a gateway means "
     "this skill; `with` names the fields of the arguments, `where` the fields that must have a value.",
+    "pictures": "What the pictures of a survey must show, with a camera of the vehicle: `every 10 m`, a pixel of at "
+    "most `resolution 2 cm`, `overlap 80 % forward 70 % side`, at most `blur 50 %` of a pixel, ground within `relief`.",
     "where": "Only if these fields have these values; after a clause, `where fitted`.",
     "here": "Where the vehicle is, or its height.",
     "policy": "Who may request what, where and when. Its version only increases.",

@@ -50,6 +50,7 @@ class NameKind(Enum):
     MEMBER = "value of an enumeration"
     CHOICE = "choice"
     PHASE = "phase"
+    CAMERA = "camera"
     ROLE = "role"
     SOURCE = "source of decisions"
     PROPOSER = "proposer"
@@ -316,6 +317,8 @@ class _OccurrenceFinder:
 
     def _vehicle(self, vehicle: VehicleDecl) -> Iterator[Occurrence]:
         yield from self.names(vehicle.without, NameKind.DECLARED)
+        for camera in vehicle.cameras:
+            yield Occurrence(camera.name.span, NameTarget(NameKind.CAMERA, camera.name.text), True)
 
     def _roles(self, roles: RoleDecl) -> Iterator[Occurrence]:
         yield from (Occurrence(each.span, NameTarget(NameKind.ROLE, each.text), True) for each in roles.names)
@@ -348,7 +351,8 @@ class _OccurrenceFinder:
         if skill.motion is not None:
             motion = skill.motion
             for name in (
-                motion.target, motion.lowest, motion.altitude, motion.every, motion.speed, motion.pattern, motion.time
+                motion.target, motion.lowest, motion.altitude, motion.every, motion.distance, motion.speed,
+                motion.pattern, motion.time,
             ):  # fmt: skip
                 if name is not None:
                     yield Occurrence(name.span, NameTarget(NameKind.PARAMETER, name.text, owner))
@@ -357,6 +361,7 @@ class _OccurrenceFinder:
             yield Occurrence(skill.timing_class.span, NameTarget(NameKind.CLASS, skill.timing_class.text))
         for link in skill.fallback:
             yield from self._link(link, scope)
+        yield from self.names([] if skill.pictures is None else [skill.pictures.camera], NameKind.CAMERA)
         for accepts in skill.accepts:
             yield from self._accepts(accepts, owner)
 

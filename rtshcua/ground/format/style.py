@@ -69,6 +69,8 @@ ITEMS = dict.fromkeys(_PLAIN_ITEMS, Style()) | {
     "validity": _style("during"),
     "sized": _style("during"),
     "accepts": _style("where", "with"),
+    "pictures": _style("every", "resolution", "overlap", "blur", "relief"),
+    "camera": _style("focal", "pixels", "every", "exposure"),
     "airspace": _style("inside", "outside", aligned=False),
     "phase": _style(aligned=False, cuts=("{",)),
     "asked": _style("by", "through"),

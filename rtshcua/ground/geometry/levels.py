@@ -12,8 +12,8 @@ from rtshcua.model.flat.mission import ALONG, TURN
 
 #: the least distance of two heights, mm: the vehicle counts as arrived within 1.5 m of a height
 LEAST_STEP: Final = 2_000
-#: the patterns with a middle to face
-CLOSED: Final = ("perimeter", "orbit")
+#: the patterns with a middle, or a face, to look at
+INWARD: Final = ("perimeter", "orbit", "around", "face")
 #: arc tangents of 1, 1/2, 1/4, ... in 1/2**`_SHIFT` of 1/100 degree
 _ARCS: Final = (
     1207959552000, 713100162638, 376782541584, 191260701262, 96001494876, 48047547032, 24029636310, 12015551407,

@@ -199,3 +199,10 @@ def _compare(p: Point, edge: Segment, limit: int) -> int:
         cross = ux * vy - uy * vx
         distance, bound = cross * cross, limit * limit * square
     return (distance > bound) - (distance < bound)
+
+
+def interpolate(a: int, b: int, over: int, whole: int) -> int:
+    """Return `a + (b - a) * over / whole`, rounded to the nearest integer."""
+    if whole < 0:
+        over, whole = -over, -whole
+    return a + (2 * (b - a) * over + whole) // (2 * whole)

@@ -14,7 +14,7 @@ FLATTENING = 1 / Decimal("298.257223563")
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937511")
 DEGREE_E7 = 10_000_000  # the unit of latitudes and longitudes: 1e-7 degree
-_CONTEXT = Context(prec=40, rounding=ROUND_HALF_EVEN)
+CONTEXT = Context(prec=40, rounding=ROUND_HALF_EVEN)
 
 
 def projection_at(latitude: int, longitude: int) -> Projection:
@@ -23,9 +23,9 @@ def projection_at(latitude: int, longitude: int) -> Projection:
     One degree of latitude is `M * pi / 180` and one of longitude `N * cos(latitude) * pi / 180`, with the meridional
     radius `M = a (1 - e2) / (1 - e2 sin2)^1.5` and the prime vertical radius `N = a / (1 - e2 sin2)^0.5`.
     """
-    with localcontext(_CONTEXT):
+    with localcontext(CONTEXT):
         phi = Decimal(latitude) / DEGREE_E7 * PI / 180
-        sine, cosine = _sine(phi), _sine(PI / 2 - phi)
+        sine, cosine = sine_of(phi), sine_of(PI / 2 - phi)
         squared = FLATTENING * (2 - FLATTENING)  # e2, the first eccentricity squared
         bend = 1 - squared * sine * sine
         root = bend.sqrt()
@@ -37,7 +37,7 @@ def projection_at(latitude: int, longitude: int) -> Projection:
     return Projection(latitude=latitude, longitude=longitude, east=east, north=north)
 
 
-def _sine(angle: Decimal) -> Decimal:
+def sine_of(angle: Decimal) -> Decimal:
     """Return the sine by its Taylor series, to the precision of the context. `angle` is in radians, at most pi."""
     term = total = angle
     square = angle * angle

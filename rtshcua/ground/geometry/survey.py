@@ -1,15 +1,22 @@
 """Survey paths: the path of a `cover` motion in an area, in integers, so that it is the same on every machine.
 
-The path stays `inset` mm away from the area's edge. Lines are parallel to the longest edge and at most one flying
-height apart, which is the view of a camera of 53 degrees, but at least `LEAST_SPACING` apart. There are at most
-`MOST_LINES`. If the straight line would leave the area or cross a hole, the path follows the edge. A perimeter runs
-around the area but not around its holes. An area in several parts has no path.
+The path stays `inset` mm away from the area's edge. Lines of a grid are parallel to the longest edge. Without a camera
+they are at most one flying height apart, which is the view of a camera of 53 degrees, but at least `LEAST_SPACING`;
+with one, the caller gives the spacing that its overlap needs (`docs/survey.md`). There are at most `MOST_LINES`. If the
+straight line would leave the area or cross a hole, the path follows the edge. A perimeter runs around the area but not
+around its holes. An area in several parts has no path.
+
+Patterns along a line (`LINE_PATTERNS`) need the centre line of a corridor, and the pattern around a structure needs an
+area with one hole.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
 
+from rtshcua.ground.geometry.inspection import CentreLine, face_scan, line_count, orbit, parallel_lines, reach_of
 from rtshcua.ground.geometry.offset import NoSuchOffset, inner
 from rtshcua.ground.geometry.polygons import (
     Point,
@@ -17,6 +24,7 @@ from rtshcua.ground.geometry.polygons import (
     Segment,
     contained,
     doubled_area,
+    interpolate,
     is_beyond,
     length,
     meet,
@@ -110,17 +118,12 @@ def numbered_edges(rings: Rings) -> Iterator[tuple[int, int, Segment]]:
             yield number, at, edge
 
 
-def interpolate(a: int, b: int, over: int, whole: int) -> int:
-    """Return `a + (b - a) * over / whole`, rounded to the nearest integer."""
-    if whole < 0:
-        over, whole = -over, -whole
-    return a + (2 * (b - a) * over + whole) // (2 * whole)
-
-
-LEAST_SPACING = 5_000  # mm
+LEAST_SPACING = 5_000  # mm, without a camera
+ROUNDING = 2  # mm, of the distance of two lines whose ends are rounded
 LEAST_INSET = 1_000  # mm
 MOST_LINES = 256
 DEFAULT_PATTERN = "grid"
+ORBIT_LEGS = 16
 
 #: corners of a regular 16-gon on a circle of radius 2**20, counter-clockwise from east
 CIRCLE_SCALE = 1 << 20
@@ -133,23 +136,130 @@ CORNERS = (
 )
 
 
-def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | None) -> tuple[Point, ...] | None:
-    """Return the points of a path in `area`, beginning at the end nearer to `start`; None if the area is too small."""
+class PathAim(NamedTuple):
+    """The centre line of the area, if it is a corridor; the distance in mm at which a structure is passed; and the
+    greatest distance of neighbouring lines in mm by which a camera keeps its overlap, or 0 if none is stated.
+    """
+
+    line: CentreLine | None = None
+    distance: int = 0
+    spacing: int = 0
+
+
+NO_AIM = PathAim()
+
+
+def survey(
+    area: Shape, pattern: str, spacing: int, inset: int, start: Point | None, aim: PathAim = NO_AIM
+) -> tuple[Point, ...] | None:
+    """Return the points of a path in `area`, beginning at the end nearer to `start`; None if the area is too small.
+
+    Lines are at most `spacing` mm apart but at least `LEAST_SPACING`, or at most `aim.spacing` where that is stated, as
+    far as `MOST_LINES` allows (`line_spacing`). There is no path where `aim` or the area lacks what a pattern needs.
+    """
+    rings = _room(area, inset)
+    if rings is None:
+        return None
+    if pattern in PATTERNS:
+        points = PATTERNS[pattern](rings, _gap(spacing, aim))
+    else:
+        points = _aimed(area, rings, pattern, _gap(spacing, aim), max(inset, LEAST_INSET), aim)
+    if points is not None and start is not None and length(points[-1], start) < length(points[0], start):
+        points.reverse()
+    return None if points is None else tuple(points)
+
+
+def line_spacing(area: Shape, pattern: str, spacing: int, inset: int, aim: PathAim = NO_AIM) -> int | None:
+    """Return the real distance of neighbouring lines of a path in mm, rounded up; None if it has no parallel lines."""
+    gap, rings = _gap(spacing, aim), _room(area, inset)
+    if pattern == "grid" and rings is not None:
+        frame = _frame(rings, gap)
+        width, count = -(-frame.width // frame.unit), frame.lines
+    elif pattern == "corridor" and aim.line is not None:
+        room = aim.line.half - max(inset, LEAST_INSET)
+        width, count = 2 * room, line_count(room, gap, MOST_LINES)
+    else:
+        return None
+    return -(-width // count) + ROUNDING if count > 1 else None
+
+
+def likely_spacings(area: Shape, inset: int, begin: Point) -> tuple[int, ...]:
+    """Return the spacings (`PathAim.spacing`) by which a grid over an area may begin at a point, the likeliest first.
+
+    The first line of a grid, or the last one of a reversed path, is half a spacing inside.
+    """
+    rings = _room(area, inset)
+    if rings is None:
+        return ()
+    frame = _frame(rings, LEAST_SPACING)
+    over = frame.across[0] * begin[0] + frame.across[1] * begin[1] - frame.low
+    inside = max(min(over, frame.width - over), 1)
+    lines = (frame.width + inside) // (2 * inside)
+    counts = [count for count in (lines, lines - 1, lines + 1) if 0 < count <= MOST_LINES]
+    return tuple(-(-frame.width // (count * frame.unit)) + ROUNDING for count in counts)
+
+
+def _gap(spacing: int, aim: PathAim) -> int:
+    """Return the greatest distance of lines before their ends are rounded."""
+    return max(aim.spacing - ROUNDING, 1) if aim.spacing else max(spacing, LEAST_SPACING)
+
+
+def _room(area: Shape, inset: int) -> Rings | None:
+    """Return the rings of an area less its edge; None if nothing or several parts remain."""
     try:
         shape = _inset(area, max(inset, LEAST_INSET))
     except NoSuchOffset:
         return None
     if isinstance(shape, RoundArea):
-        rings: Rings = (_regular(shape.center, shape.radius),)
+        return (_regular(shape.center, shape.radius),)
+    found = parts(shape)
+    return (found[0][0], *found[0][1]) if len(found) == 1 else None
+
+
+def _aimed(area: Shape, rings: Rings, pattern: str, spacing: int, inset: int, aim: PathAim) -> list[Point] | None:
+    """Return the path of a pattern that looks at a line or a structure, if it stays in the area."""
+    line = aim.line
+    if pattern == AROUND:
+        hole = structure_of(area)
+        path = [] if hole is None else _around(hole, aim.distance)
+    elif line is None:
+        return None
+    elif pattern == "corridor":
+        lines = parallel_lines(line, inset, spacing, MOST_LINES)
+        path = [point for each in lines or () for point in each]
     else:
-        found = parts(shape)
-        if len(found) > 1:
-            return None
-        rings = (found[0][0], *found[0][1])
-    points = PATTERNS[pattern](rings, max(spacing, LEAST_SPACING))
-    if points is not None and start is not None and length(points[-1], start) < length(points[0], start):
-        points.reverse()
-    return None if points is None else tuple(points)
+        path = [(x, y) for x, y, _, _ in face_scan((line.points[0], line.points[-1]), aim.distance, (0,))]
+        path = path if len(line.points) == 2 and inset + aim.distance <= line.half else []
+    path = _distinct(path)
+    if pattern == AROUND and not _stays(rings, path):
+        return None
+    return path or None
+
+
+def _around(hole: Ring, distance: int) -> list[Point]:
+    """Return a round at a distance from the circle that encloses a structure."""
+    centre = _centroid(hole)
+    return [(x, y) for x, y, _, _ in orbit(centre, reach_of(hole, centre) + distance, (0,), ORBIT_LEGS)]
+
+
+def around_reach(hole: Ring, distance: int) -> int:
+    """Return the greatest distance in mm at which a round sees a structure in the middle of its view."""
+    centre = _centroid(hole)
+    farthest = max(length(centre, point) + 1 for point in _around(hole, distance))
+    return farthest - _clearance(centre, hole)
+
+
+def structure_of(area: Shape) -> Ring | None:
+    """Return the one hole of an area, counter-clockwise; None if it has none or several."""
+    found = [] if isinstance(area, RoundArea) else parts(area)
+    return tuple(reversed(found[0][1][0])) if len(found) == 1 and len(found[0][1]) == 1 else None
+
+
+def _stays(rings: Rings, path: Sequence[Point]) -> bool:
+    """Whether a path stays in an area."""
+    return all(contained(rings, point) for point in path) and not any(
+        meet(*leg, *edge) for ring in rings for edge in sides(ring) for leg in pairwise(path)
+    )
 
 
 @lru_cache(maxsize=64)
@@ -179,19 +289,25 @@ def _orbit(rings: Rings, _: int) -> list[Point] | None:
     center = _centroid(outer)
     if not contained((outer,), center):
         return None
-    low, high = 0, max(length(center, corner) for corner in outer)
-    while high - low > 1:
-        middle = (low + high) // 2
-        if all(is_beyond(center, edge, middle) for edge in sides(outer)):
-            low = middle
-        else:
-            high = middle
-    circle = _regular(center, low)
-    if low < LEAST_INSET or any(contained((hole,), circle[0]) for hole in holes):
+    radius = _clearance(center, outer)
+    circle = _regular(center, radius)
+    if radius < LEAST_INSET or any(contained((hole,), circle[0]) for hole in holes):
         return None
     if any(meet(*leg, *edge) for hole in holes for edge in sides(hole) for leg in sides(circle)):
         return None
     return [*circle, circle[0]]
+
+
+def _clearance(center: Point, ring: Ring) -> int:
+    """Return the distance from a point to the nearest edge of a ring, rounded down."""
+    low, high = 0, max(length(center, corner) for corner in ring)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if all(is_beyond(center, edge, middle) for edge in sides(ring)):
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 def _centroid(ring: Ring) -> Point:
@@ -204,19 +320,38 @@ def _centroid(ring: Ring) -> Point:
     return sums[0] // area, sums[1] // area
 
 
-def _grid(rings: Rings, spacing: int) -> list[Point]:
-    """Return a path back and forth on parallel lines, evenly spaced over the width of the area."""
+class GridFrame(NamedTuple):
+    """The parallel lines of a grid: their direction, the direction across, where the area begins, and its width.
+
+    `low` and `width` are inner products with `across`, whose length is `unit`, rounded down.
+    """
+
+    along: Point
+    across: Point
+    low: int
+    width: int
+    unit: int
+    lines: int
+
+
+def _frame(rings: Rings, spacing: int) -> GridFrame:
+    """Return the lines of a grid, evenly spaced over the width of the area."""
     a, b = max(sides(rings[0]), key=lambda edge: length(*edge))
     along = (b[0] - a[0], b[1] - a[1])
     across = (-along[1], along[0])
     unit = length(a, b)
     heights = [across[0] * x + across[1] * y for x, y in rings[0]]
     low, width = min(heights), max(heights) - min(heights)
-    count = min(max(1, -(-width // (spacing * unit))), MOST_LINES)
+    return GridFrame(along, across, low, width, unit, min(max(1, -(-width // (spacing * unit))), MOST_LINES))
+
+
+def _grid(rings: Rings, spacing: int) -> list[Point]:
+    """Return a path back and forth on parallel lines."""
+    along, across, low, width, _, lines = _frame(rings, spacing)
     path: list[Point] = []
     last: EdgePoint | None = None
-    for line in range(count):
-        met = _line(rings, across, low + (2 * line + 1) * width // (2 * count))
+    for line in range(lines):
+        met = _line(rings, across, low + (2 * line + 1) * width // (2 * lines))
         met.sort(key=lambda each: (along[0] * each[0][0] + along[1] * each[0][1], each[1:]), reverse=bool(line % 2))
         for each in met:
             path += [*(() if last is None else path_within(rings, last, each)), each[0]]
@@ -245,3 +380,11 @@ PATTERNS: Mapping[str, Callable[[Rings, int], list[Point] | None]] = {
     "perimeter": _perimeter,
     "orbit": _orbit,
 }
+#: patterns along the centre line of a corridor
+LINE_PATTERNS = ("corridor", "face")
+#: the pattern around the structure in the hole of an area
+AROUND = "around"
+#: all patterns
+ALL_PATTERNS = (*PATTERNS, *LINE_PATTERNS, AROUND)
+#: patterns that look sideways at a structure; the others look down
+SIDEWAYS = ("face", AROUND)

@@ -51,8 +51,11 @@ class Exact(NamedTuple):
 def exact(number: str, unit: str | None, negative: bool = False) -> Exact:
     """Return the value of `number` (digits, with `_` and one `.` allowed) in `unit`; without a unit, a plain count."""
     known = PLAIN if unit is None else UNITS.get(unit)
-    if known is None:
-        return Exact(0, Dimension.COUNT, Trouble.UNKNOWN_UNIT)
+    return Exact(0, Dimension.COUNT, Trouble.UNKNOWN_UNIT) if known is None else exact_in(number, known, negative)
+
+
+def exact_in(number: str, known: UnitOfMeasure, negative: bool = False) -> Exact:
+    """Return the value of `number` in a unit."""
     whole, _, fraction = number.replace("_", "").partition(".")
     fraction = fraction.rstrip("0")
     whole = whole.lstrip("0")

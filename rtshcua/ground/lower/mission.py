@@ -16,15 +16,15 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.symbols import suggestion
-from rtshcua.ground.geometry.levels import LEAST_STEP, heights_between, inward, levelled
+from rtshcua.ground.geometry.levels import LEAST_STEP, heights_between, levelled
 from rtshcua.ground.geometry.polygons import Point
 from rtshcua.ground.geometry.shapes import MultiPolygon, parts
-from rtshcua.ground.geometry.survey import DEFAULT_PATTERN, survey
 from rtshcua.ground.lower.conditions import ConditionPlace
 from rtshcua.ground.lower.contracts import cells_of, recorded
 from rtshcua.ground.lower.fixed_tables import FixedTables, knows_zone
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.policy_checks import check_step_fitted
+from rtshcua.ground.lower.survey_plan import SurveyPlan, survey_plan
 from rtshcua.ground.lower.tables import JointSourceTable, SourceTable
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import PLACE, Contract, Facing, MotionKind, SourceKind
@@ -36,6 +36,20 @@ from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension, display
+
+#: what an area needs for a pattern
+_NEEDED = {
+    "corridor": "declare the zone as in `corridor(a, b, c, width 40 m)`, or use a `grid`",
+    "face": "declare the zone along the face, as in `corridor(a, b, width 60 m)`: the path is left of `a` to `b`",
+    "around": "leave the structure out of the zone, as in `difference(circle(a, 60 m), circle(a, 8 m))`",
+}
+_EDGE = "the path stays the vehicle's position error away from the edge"
+#: what to do if an area has too little room for a pattern
+_ROOM = dict.fromkeys(("grid", "perimeter", "orbit"), f"use a `perimeter`, which needs the least room; {_EDGE}") | {
+    "corridor": f"declare a wider corridor; {_EDGE}",
+    "face": f"declare a wider corridor, or fly nearer to the face; {_EDGE}",
+    "around": f"declare a larger zone around the structure, or fly nearer to it; {_EDGE}",
+}
 
 
 class LoweredMission(NamedTuple):
@@ -307,15 +321,19 @@ class StepLowering:
         plan = straight_plan(contract, arguments)
         if plan.kind != MotionKind.COVER:
             return plan
-        heights = self._heights(step, skill, bound, plan.altitude)
+        lowest = self._lowest(skill, bound, plan.altitude)
+        survey = survey_plan(skill, bound, lowest, self._under.zones, self._under.vehicle)
+        heights = self._heights(step, skill, bound, plan.altitude, survey)
         if heights is None:
             return None
-        points = self._survey_path(step, skill, bound, min(heights, default=plan.altitude))
+        points = self._survey_path(step, survey)
         if points is None:
             return None
-        path = levelled(points, heights, inward(points) if contract.motion.facing == Facing.INWARD else ())
+        path = levelled(points, heights, survey.facing(points) if contract.motion.facing == Facing.INWARD else ())
         if len(path.points) > MAX_PATH:
-            zone = argument_span(self._context, step, _target(skill))
+            assert skill.motion is not None
+            assert skill.motion.target is not None
+            zone = argument_span(self._context, step, skill.motion.target.text)
             self._context.report.add(
                 codes.TOO_MANY,
                 step.span,
@@ -326,17 +344,28 @@ class StepLowering:
         flat = tuple(coordinate for point in path.points for coordinate in point)
         return replace(plan, path=flat, heights=path.heights, headings=path.headings)
 
-    def _heights(self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int) -> tuple[int, ...] | None:
+    @staticmethod
+    def _lowest(skill: SkillDecl, bound: Sequence[Bound], altitude: int) -> int:
+        """Return the lowest height of a `cover` motion."""
+        assert skill.motion is not None
+        if skill.motion.lowest is None:
+            return altitude
+        lowest = bound[[parameter.name.text for parameter in skill.parameters].index(skill.motion.lowest.text)]
+        assert isinstance(lowest, int)
+        return lowest
+
+    def _heights(
+        self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int, survey: SurveyPlan
+    ) -> tuple[int, ...] | None:
         """Return the heights of a `cover` motion at several heights, or None after a finding; empty for one at its
-        altitude.
+        altitude. They are as far apart as the motion says, or else as the overlap of the pictures of a face allows.
         """
         assert skill.motion is not None
         if skill.motion.lowest is None:
             return ()
         names = [parameter.name.text for parameter in skill.parameters]
-        lowest = bound[names.index(skill.motion.lowest.text)]
-        every = None if skill.motion.every is None else bound[names.index(skill.motion.every.text)]
-        assert isinstance(lowest, int)
+        lowest = survey.height
+        every = survey.levels_apart if skill.motion.every is None else bound[names.index(skill.motion.every.text)]
         assert every is None or isinstance(every, int)
         if lowest > altitude:
             what = f"the lowest height, {display(lowest, Dimension.LENGTH)}, is above the highest"
@@ -350,25 +379,20 @@ class StepLowering:
         self._context.report.add(codes.BAD_LEVELS, argument_span(self._context, step, at.text), what)
         return None
 
-    def _survey_path(
-        self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int
-    ) -> tuple[Point, ...] | None:
+    def _survey_path(self, step: Step, plan: SurveyPlan) -> tuple[Point, ...] | None:
         """Return the survey path of a `cover` motion at one height, or None after a finding."""
-        assert skill.motion is not None
-        names = [parameter.name.text for parameter in skill.parameters]
-        zone = bound[names.index(_target(skill))]
-        assert isinstance(zone, ZoneDecl)
-        pattern = DEFAULT_PATTERN
-        if skill.motion.pattern is not None:
-            at = names.index(skill.motion.pattern.text)
-            ordinal = bound[at]
-            assert isinstance(ordinal, int)
-            pattern = skill.parameters[at].choices[ordinal].text
-        region = self._under.zones.regions[self._under.zones.index[zone.name.text]]
-        start = None if zone.entry is None else self._under.zones.place(zone.entry)
-        points = survey(region.shape, pattern, altitude, self._under.policy.vehicle.position_error, start)
+        zone, shape, pattern = plan.zone, plan.shape, plan.pattern
+        if plan.missing:
+            self._context.report.add(
+                codes.PATTERN_AREA,
+                step.span,
+                f"`{zone.name.text}` {plan.missing}",
+                help=_NEEDED[pattern],
+                labels=[(zone.name.span, "declared here")],
+            )
+            return None
+        points = plan.path(self._under.policy.vehicle.position_error)
         if points is None:
-            shape = region.shape
             several = len(parts(shape)) if isinstance(shape, MultiPolygon) else 1
             self._context.report.add(
                 codes.AREA_TOO_SMALL,
@@ -376,10 +400,7 @@ class StepLowering:
                 f"`{zone.name.text}` has {several} parts, but a survey path covers only one"
                 if several > 1
                 else f"`{zone.name.text}` is too small or too curved for the pattern `{pattern}`",
-                help="declare each part as a zone, and survey one after the other"
-                if several > 1
-                else "use a `perimeter`, which needs the least room; the path stays the vehicle's position error away "
-                "from the edge",
+                help="declare each part as a zone, and survey one after the other" if several > 1 else _ROOM[pattern],
                 labels=[(zone.name.span, "declared here")],
             )
             return None
@@ -398,9 +419,3 @@ def _timed(skills: Contract, own: Overrides) -> Contract:
         phases=tuple(name.text for name in own.phases) or skills.phases,
         record=recorded((*skills.record, *(name.text for name in own.record))),
     )
-
-
-def _target(skill: SkillDecl) -> str:
-    assert skill.motion is not None
-    assert skill.motion.target is not None
-    return skill.motion.target.text

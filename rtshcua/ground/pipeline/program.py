@@ -26,6 +26,7 @@ from rtshcua.ground.prove.mission_bounds import Bounds, bounds_of, greatest
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.proofs import prove_mission, prove_policy, report_refused
 from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart
+from rtshcua.ground.prove.survey_quality import StepPictures, step_pictures
 from rtshcua.ground.testing.case import PolicyCase, PolicyUnderTest
 from rtshcua.ground.testing.case_lowering import cases_of
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight, ScenarioMission, scenarios_of
@@ -79,6 +80,7 @@ class Checked:
     policies: tuple[LoweredPolicy, ...] = ()
     grounds: tuple[ProofContext, ...] = ()  # the policies, prepared as on board, with the state of their proofs
     planned: tuple[PlannedMission, ...] = ()
+    pictures: Mapping[str, tuple[StepPictures, ...]] = field(default_factory=dict)  # of surveys, as `planned`
 
 
 def compile_program(
@@ -137,7 +139,7 @@ def examine_program(program: Program, dialect: Dialect, issued_at_us: int = 0) -
         return Checked(run.diagnostics(), {}, planned=tuple(run.planned.values()))
     grounds = tuple(run.grounds())
     lowered = tuple(each.lowered for each in grounds)
-    return Checked(run.diagnostics(), run.bounds, lowered, grounds, tuple(run.planned.values()))
+    return Checked(run.diagnostics(), run.bounds, lowered, grounds, tuple(run.planned.values()), run.pictures)
 
 
 def _candidates(program: Program) -> list[MissionDecl]:
@@ -172,6 +174,7 @@ class Compilation:
         self.report.found += program.diagnostics
         self.bounds: dict[str, Bounds] = {}
         self.planned: dict[str, PlannedMission] = {}
+        self.pictures: dict[str, tuple[StepPictures, ...]] = {}
         self.whole = program.whole and not any(found.code in FILE_CODES for found in program.diagnostics)
         self._imports = Imports(program.units, program.stable)
         self._policies: dict[tuple[str, str], ProofContext | None] = {}
@@ -254,6 +257,7 @@ class Compilation:
         self.planned.setdefault(mission.name.text, PlannedMission(under.lowered, flat, mission))
         start = self.start if mission.name.text == self._chosen else FROM_HOME
         bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat, start))
+        self.pictures.setdefault(mission.name.text, step_pictures(under, mission, flat))
         self.bounds[mission.name.text] = greatest(bounds, self.bounds.get(mission.name.text))
         tested = PolicyUnderTest(under.lowered, under.prepared)
         self._flown.setdefault(mission.name.text, ScenarioMission(tested, flat, mission))  # the first has the defaults

@@ -37,6 +37,7 @@ from rtshcua.ground.prove.step_starts import (
 )
 from rtshcua.ground.prove.step_time_and_energy import StepBound, prove_step_bounds
 from rtshcua.ground.prove.step_times import MissionStep, mission_steps, prove_validity
+from rtshcua.ground.prove.survey_quality import prove_survey_quality
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl
@@ -44,7 +45,7 @@ from rtshcua.model.ir.missions import MissionDecl
 #: the proofs of a policy, in order
 POLICY_PROOFS = (
     prove_links, prove_last_links, prove_deferrals, prove_observability, prove_contracts, prove_delegations,
-    prove_rules,
+    prove_rules, prove_survey_quality,
 )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.policy_checks import applies, rule_applies
 from rtshcua.ground.lower.zones import derived_name
 from rtshcua.ground.prove.mission_bounds import Bounds, rounded_energy, rounded_time
+from rtshcua.ground.prove.survey_quality import StepPictures, pictures_text
 from rtshcua.ground.report.permissions import permitted_limits, rights, rule_names, vocabulary_of
 from rtshcua.ground.report.policy_changes import PolicyChanges, changes
 from rtshcua.ground.report.prose.mission_steps import (
@@ -38,6 +39,7 @@ from rtshcua.ground.report.prose.rules_and_skills import (
     describe_motion,
     describe_parameter,
     describe_patterns,
+    describe_pictures,
     describe_record,
     describe_rule,
     describe_silence,
@@ -179,8 +181,15 @@ def _place(what: str, latitude: int, longitude: int, x: int, y: int) -> PlaceVie
     return PlaceView(what, degrees(latitude, "N", "S"), degrees(longitude, "E", "W"), x, y)
 
 
-def mission_view(mission: Mission, policy: Policy, bounds: Bounds | None, values: Mapping[str, str]) -> MissionView:
+def mission_view(
+    mission: Mission,
+    policy: Policy,
+    bounds: Bounds | None,
+    values: Mapping[str, str],
+    pictures: Iterable[StepPictures] = (),
+) -> MissionView:
     """Describe a mission; `values` are the parameter values for which its path is drawn."""
+    shown = {each.step_number: f"Pictures by {pictures_text(each)}." for each in pictures}
     first = mission.invocations[0]
     by = f"Proposed by {mission.proposer or 'a person'}, {describe_asker(first, policy)}."
     drawn = ", ".join(f"`{name}` = {value}" for name, value in values.items())
@@ -190,7 +199,7 @@ def mission_view(mission: Mission, policy: Policy, bounds: Bounds | None, values
         proposed=by,
         bounds=() if bounds is None else tuple(_bounds(bounds)),
         values=drawn,
-        steps=tuple(_step(step, mission, policy) for step in mission.invocations),
+        steps=tuple(_step(step, mission, policy, shown.get(step.step + 1, "")) for step in mission.invocations),
     )
 
 
@@ -200,7 +209,7 @@ def _bounds(bounds: Bounds) -> Iterator[Fact]:
     yield Fact("Charge", f"at most {rounded_energy(bounds.energy)} of a full charge, the sum over all its steps")
 
 
-def _step(step: Invocation, mission: Mission, policy: Policy) -> StepView:
+def _step(step: Invocation, mission: Mission, policy: Policy, pictures: str) -> StepView:
     return StepView(
         number=step.step + 1,
         phase=mission.phases[step.phase],
@@ -212,6 +221,7 @@ def _step(step: Invocation, mission: Mission, policy: Policy) -> StepView:
         motion=MotionKind(step.plan.kind).name.lower(),
         speed=step.plan.speed,
         heights=step.plan.heights,
+        pictures=pictures,
     )
 
 
@@ -308,7 +318,7 @@ def _skill(subject: ReportedPolicy, skill: SkillDecl, changed: bool) -> SkillVie
     return SkillView(
         name=skill.name.text,
         note=subject.note(skill),
-        motion=describe_motion(skill.motion),
+        motion=describe_motion(skill.motion) + describe_pictures(skill.pictures),
         patterns=tuple(PatternView(*each) for each in describe_patterns(skill)),
         parameters=tuple(
             ParameterView(each.name.text, *describe_parameter(each, subject.names)) for each in skill.parameters

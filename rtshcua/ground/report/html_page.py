@@ -6,14 +6,19 @@ from itertools import pairwise
 from math import hypot
 from typing import Final, NamedTuple
 
+from markupsafe import Markup
+
 from rtshcua.ground.drawing.canvas import number
 from rtshcua.ground.drawing.height_profile import planned_heights
-from rtshcua.ground.drawing.html import rendered
+from rtshcua.ground.drawing.html import rendered, templates, visibly
+from rtshcua.ground.drawing.picture import drawing_style
 from rtshcua.ground.drawing.profile import profiles
 from rtshcua.ground.drawing.zone_map import mission_map, zone_maps
 from rtshcua.ground.editor.keyword_help import REASONS
-from rtshcua.ground.geometry.shapes import SimplePolygon
-from rtshcua.ground.geometry.survey import survey
+from rtshcua.ground.geometry.inspection import CentreLine
+from rtshcua.ground.geometry.polygons import Ring
+from rtshcua.ground.geometry.shapes import polygonal
+from rtshcua.ground.geometry.survey import NO_AIM, PathAim, survey
 from rtshcua.ground.report.glance import glance
 from rtshcua.ground.report.report_model import Chapter, PolicyReport
 
@@ -133,8 +138,27 @@ def _chunks(digest: str) -> list[str]:
     return [digest[at : at + 8] for at in range(0, len(digest), 8)]
 
 
-#: the sample area in mm, counter-clockwise; the altitude and the distance to its edge; its entry
-_AREA: Final = ((0, 0), (120_000, 0), (150_000, 55_000), (120_000, 90_000), (0, 90_000))
+class PatternSample(NamedTuple):
+    """A sample area for the drawing of a pattern, in mm, its holes, and what the pattern aims at."""
+
+    area: Ring
+    structure: Ring = ()
+    aim: PathAim = NO_AIM
+
+
+#: the sample areas, counter-clockwise; the altitude and the distance to their edge; the entry
+_HOUSE: Final = ((0, 0), (120_000, 0), (150_000, 55_000), (120_000, 90_000), (0, 90_000))
+_YARD: Final = ((0, 0), (150_000, 0), (150_000, 90_000), (0, 90_000))
+_TOWER: Final = ((69_000, 39_000), (69_000, 51_000), (81_000, 51_000), (81_000, 39_000))
+_ROAD: Final = ((0, 1_000), (83_000, 1_000), (164_000, 61_000), (136_000, 99_000), (67_000, 49_000), (0, 49_000))
+_WALL: Final = ((0, 20_000), (150_000, 20_000), (150_000, 80_000), (0, 80_000))
+_SAMPLES: Final = {
+    "corridor": PatternSample(
+        _ROAD, aim=PathAim(CentreLine(((0, 25_000), (75_000, 25_000), (150_000, 80_000)), 24_000))
+    ),
+    "face": PatternSample(_WALL, aim=PathAim(CentreLine(((4_000, 50_000), (146_000, 50_000)), 30_000), 18_000)),
+    "around": PatternSample(_YARD, _TOWER, PathAim(None, 22_000)),
+}
 _HEIGHT, _INSET, _ENTRY = 20_000, 3_000, (5_000, 5_000)
 #: px
 _WIDTH, _TALL, _MARGIN, _ARROW = 320, 208, 14, 7.0
@@ -142,11 +166,14 @@ _WIDTH, _TALL, _MARGIN, _ARROW = 320, 208, 14, 7.0
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """A drawing: the outline of the area and the path as points, its begin, and arrows as SVG paths."""
+    """A drawing: the outline of the area, of a structure or the line in it and of the path as points, the path's begin,
+    and arrows as SVG paths.
+    """
 
     width: int
     height: int
     area: str
+    structure: str
     way: str
     start: tuple[float, float]
     arrows: tuple[str, ...]
@@ -155,9 +182,11 @@ class Pattern:
 @cache
 def pattern(name: str) -> Pattern:
     """Draw a survey pattern, by its name, over a sample area with the real planner."""
-    way = survey(SimplePolygon(_AREA), name, _HEIGHT, _INSET, _ENTRY)
+    sample = _SAMPLES.get(name, PatternSample(_HOUSE))
+    shape = polygonal((sample.area, sample.structure) if sample.structure else (sample.area,))
+    way = survey(shape, name, _HEIGHT, _INSET, _ENTRY, sample.aim)
     assert way is not None
-    scale = (_WIDTH - 2 * _MARGIN) / max(x for x, _ in _AREA)
+    scale = (_WIDTH - 2 * _MARGIN) / max(x for x, _ in sample.area)
 
     def at(x: int, y: int) -> tuple[float, float]:
         return _MARGIN + x * scale, _TALL - _MARGIN - y * scale
@@ -165,14 +194,29 @@ def pattern(name: str) -> Pattern:
     points = [at(*each) for each in way]
     legs = list(pairwise(points))
     shown = legs[:: max(1, len(legs) // 5)]
+    line = () if sample.aim.line is None else sample.aim.line.points
+    closed = (*sample.structure, *sample.structure[:1])
     return Pattern(
         _WIDTH,
         _TALL,
-        _outline([at(*each) for each in _AREA]),
+        _outline([at(*each) for each in sample.area]),
+        _outline([at(*each) for each in closed or line]),
         _outline(points),
         points[0],
         tuple(_arrow(*leg) for leg in shown),
     )
+
+
+def pattern_picture(name: str) -> str:
+    """Draw a survey pattern as an SVG file of its own."""
+    environment, _ = templates(PACKAGE)
+    style = Markup("".join(line + "\n" for line in drawing_style().splitlines() if _drawn(line)))
+    return visibly(environment.get_template("pattern.svg").render(name=name, figure=pattern(name), style=style))
+
+
+def _drawn(rule: str) -> bool:
+    """Whether a line of the style concerns the drawing of a pattern."""
+    return rule.startswith((".sheet ", ".zone ", ".zone.derived", ".way ", ".arrow", ".stop ", "@media", "}"))
 
 
 def _outline(points: list[tuple[float, float]]) -> str:

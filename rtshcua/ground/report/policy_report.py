@@ -8,6 +8,7 @@ from rtshcua.ground.checker.symbols import collect
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.prove.mission_bounds import Bounds
+from rtshcua.ground.prove.survey_quality import StepPictures
 from rtshcua.ground.report.chapter import chapter, digest_of, mission_view
 from rtshcua.ground.report.prose.cases_and_scenarios import (
     describe_decision,
@@ -117,6 +118,7 @@ class CompiledMission:
     mission: Mission
     declaration: MissionDecl
     bounds: Bounds | None
+    pictures: tuple[StepPictures, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +158,7 @@ def policy_report(
             subject, digest = ReportedPolicy(part.program, lowered), digest_of(lowered.policy)
             shared.setdefault(digest, subject)
         for each in part.missions:
-            view = mission_view(each.mission, each.policy, each.bounds, _values(each.declaration))
+            view = mission_view(each.mission, each.policy, each.bounds, _values(each.declaration), each.pictures)
             flown.setdefault(digest_of(each.policy), {})[view] = None
         for policy, scenario in _scenarios(part):
             scenarios.setdefault(digest_of(policy), {})[scenario] = None

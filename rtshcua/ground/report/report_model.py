@@ -147,7 +147,7 @@ class SignalView:
 class StepView:
     """A step of a mission, and its path of local places, which ends at the last one. `tighter` are the limits that
     tighten its skill's contract. `motion` is the kind of its motion (`rtshcua.model.flat.contract.MotionKind`), and
-    `speed` is in mm/s, 0 where the vehicle chooses it.
+    `speed` is in mm/s, 0 where the vehicle chooses it. `pictures` are the proved numbers of a survey's pictures.
     """
 
     number: int
@@ -160,6 +160,7 @@ class StepView:
     motion: str
     speed: int
     heights: tuple[int, ...] = ()
+    pictures: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,6 +116,31 @@ class Acceleration(Node):
     time: Quantity
 
 
+class OpticalLength(Node, kw_only=True):
+    """A small length in um, finer than the mm of other lengths: `13.2 mm`."""
+
+    value: int
+
+
+class CameraDecl(Node, kw_only=True):
+    """`camera mapper sensor 13.2 mm by 8.8 mm focal 8.8 mm pixels 5472 by 3648 every at least 700 ms exposure at most
+    1 ms`.
+
+    `width` and `columns` are across the direction of flight of a camera that looks down, `height` and `rows` along it;
+    the other way round if it is mounted `portrait`. `interval` is the shortest time between two pictures.
+    """
+
+    name: Name
+    width: OpticalLength
+    height: OpticalLength
+    focal: OpticalLength
+    columns: Quantity
+    rows: Quantity
+    interval: Quantity
+    exposure: Quantity
+    portrait: bool
+
+
 class VehicleDecl(Node):
     """One aircraft, as the checks, the simulation and "wrong vehicle" need it; signed with the policy.
 
@@ -148,3 +173,4 @@ class VehicleDecl(Node):
     flight: Quantity | None = None  # how long a full battery lasts, whatever the vehicle flies
     time_zone: Name | None = None  # `clock "Europe/Berlin"`
     cells: Quantity | None = None  # `cells 4`: the number in series, by which `battery.cell` is divided
+    cameras: tuple[CameraDecl, ...] = ()  # read on the ground alone

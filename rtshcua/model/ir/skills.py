@@ -4,6 +4,7 @@ from typing import Literal
 
 from rtshcua.model.ir.expression import Condition, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name, Node
+from rtshcua.model.ir.places import OpticalLength
 
 
 class ParameterDecl(Node):
@@ -35,6 +36,7 @@ class MotionDecl(Node):
     lowest: Name | None = None  # a parameter of type altitude; `altitude` is then the highest
     every: Name | None = None  # a parameter of type length: the greatest distance of two heights
     facing: Literal["inward"] | None = None
+    distance: Name | None = None  # a parameter of type length: from the structure that a pattern looks at
 
 
 class ArgumentValue(Node):
@@ -101,10 +103,36 @@ class AcceptsDecl(Node):
     arguments: tuple[SourcedArgument, ...]
 
 
-class Sized(Node):
-    """`lasts at most longest`: a part of a contract whose value is one of the skill's sizes."""
+class PicturesDecl(Node):
+    """`pictures by mapper every 10 m resolution 2 cm overlap 80 % forward 70 % side blur 50 % relief 5 m`.
 
-    part: Literal["deadline", "validity", "duration", "grace", "energy"]
+    What the pictures of a survey must show, proved from the vehicle's camera and the planned path, on the ground alone.
+    """
+
+    camera: Name
+    every: Quantity | None  # a length along the path, or a duration
+    resolution: OpticalLength | Quantity | None  # the most that a pixel may show; a length if it is a size
+    forward: Quantity | None
+    side: Quantity | None
+    blur: Quantity | None  # the most that a picture may smear, in shares of a pixel
+    relief: Quantity | None  # how far the ground may lie above or below home
+
+    @property
+    def resolution_um(self) -> int | None:
+        """The resolution in um."""
+        written = self.resolution
+        if written is None:
+            return None
+        return written.value if isinstance(written, OpticalLength) else written.value * 1_000
+
+
+class Sized(Node):
+    """`lasts at most longest`: a part of a contract, or of its `pictures`, whose value is one of the skill's sizes."""
+
+    part: Literal[
+        "deadline", "validity", "duration", "grace", "energy",
+        "every", "resolution", "forward", "side", "blur", "relief",
+    ]  # fmt: skip
     size: Reference
 
 
@@ -112,7 +140,8 @@ class SkillDecl(Node, kw_only=True):
     """A skill contract. None or an empty tuple means: not written (the checker reports the required fields).
 
     `sizes` are numbers that a program may set (`SizesDecl`), each with a default; `sized` are the parts that name
-    one. `checker/symbols.py` substitutes the values, and `sized` is then empty. `accepts` is no part of the contract.
+    one. `checker/symbols.py` substitutes the values, and `sized` is then empty. `accepts` and `pictures` are no part of
+    the contract.
     """
 
     name: Name
@@ -133,6 +162,7 @@ class SkillDecl(Node, kw_only=True):
     sizes: tuple[ParameterDecl, ...] = ()
     sized: tuple[Sized, ...] = ()
     accepts: tuple[AcceptsDecl, ...] = ()
+    pictures: PicturesDecl | None = None
 
 
 class GivenSize(Node):

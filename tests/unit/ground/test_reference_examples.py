@@ -1,4 +1,4 @@
-"""Every example of docs/language.md is compiled, and nothing is found in it."""
+"""Every example of docs/language.md and docs/survey.md is compiled, and nothing is found in it."""
 
 import re
 from pathlib import Path
@@ -10,8 +10,8 @@ from rtshcua.mavlink import dialect
 from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[3]
-PAGE = (CHECKOUT / "docs" / "language.md").read_text(encoding="utf-8")
-SOURCES = re.findall(r"^```rts\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+PAGE, SURVEY = ((CHECKOUT / "docs" / name).read_text(encoding="utf-8") for name in ("language.md", "survey.md"))
+SOURCES = re.findall(r"^```rts\n(.*?)^```$", PAGE + SURVEY, re.DOTALL | re.MULTILINE)
 CONDITIONS = [
     line
     for block in re.findall(r"^```condition\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)

@@ -82,7 +82,9 @@ def approve(
         return refuse(draft)
     told = _tell(draft, step)
     if draft.planned is not None and not refused and not other_path:
-        return fail(ExitCode.REFUSED, "nothing was signed: the path differs from the planner's", AGREE, slug=OTHER)
+        return fail(
+            ExitCode.REFUSED, f"nothing was signed: the path {_differs(draft.planned)} the planner's", AGREE, slug=OTHER
+        )
     own = draft.document.role
     question = visible(f"sign as {own} that {_answer(refused)}?")
     signer = ApprovalSigner(
@@ -103,13 +105,21 @@ def _tell(draft: ApprovalDraft, step: int) -> str:
     # chosen by the proposer: it must not push the rest out of sight
     mission = shorten(draft.bundle.mission.name, NAME_SHOWN)
     say(f"step {step} of `{mission}` on `{draft.document.vehicle}`: `{told}`")
+    if draft.spacing is not None:
+        say(f"its grid has a line every {prose.length(draft.spacing)}, as the mission's signer chose for a camera")
     if draft.planned is None:
         return told
-    say(f"warning: the path in the mission differs from the planner's: {_other(draft.planned)}")
-    return f"{told}, a path that differs from the planner's"
+    say(f"warning: the path in the mission {_differs(draft.planned)} the planner's: {_other(draft.planned)}")
+    return f"{told}, a path that {_differs(draft.planned)} the planner's"
+
+
+def _differs(planned: PlannedPath) -> str:
+    return "differs from" if planned.computable else "is not shown to be"
 
 
 def _other(planned: PlannedPath) -> str:
+    if not planned.computable:
+        return "a bundle does not carry the line of a corridor, so the planner cannot compute it again"
     if not planned.points:
         return "the planner finds none there"
     if planned.levels:

@@ -20,6 +20,7 @@ from rtshcua.front.cli.render.drawn import tell_drawn
 from rtshcua.front.cli.render.findings import Findings
 from rtshcua.front.cli.render.progress import watched
 from rtshcua.front.cli.stdout import out
+from rtshcua.ground.prove.survey_quality import pictures_text
 from rtshcua.ground.report.report_model import ChangeView
 
 
@@ -73,7 +74,12 @@ def _as_json(found: CheckResult) -> dict[str, object]:
         for each in found.versions
     ]
     return {
-        "missions": [{"mission": each.name, "file": each.file} | bounds_dict(each.bounds) for each in found.missions],
+        "missions": [
+            {"mission": each.name, "file": each.file}
+            | bounds_dict(each.bounds)
+            | {"pictures": [one._asdict() for one in each.pictures]}
+            for each in found.missions
+        ],
         "versions": versions,
         "not_here": found.not_here,
         "left_out": [each._asdict() for each in found.left_out],
@@ -89,8 +95,7 @@ def _tell(found: CheckResult, since: Path | None, now_us: int) -> None:
         out(f"note: `{name}` is empty")
     for mission in found.missions:
         out(f"{_named(mission, found.missions)}: {bounds_told(mission.bounds)}")
-        for line in steps_told(mission.bounds):
-            out(line)
+        _tell_steps(mission)
     for left_out in found.left_out:
         out(left_out.told())
     for refused in found.now:
@@ -105,6 +110,15 @@ def _tell(found: CheckResult, since: Path | None, now_us: int) -> None:
             _tell_change(change)
     for name in found.not_here if found.versions else ():
         out(f"{name}: only in {since}; no policy here to compare with")
+
+
+def _tell_steps(mission: CheckedMission) -> None:
+    """Print the bounds of each step, and the pictures of its survey."""
+    pictures = {each.step_number: pictures_text(each) for each in mission.pictures}
+    for number, line in enumerate(steps_told(mission.bounds), 1):
+        out(line)
+        if number in pictures:
+            out_wrapped("    ", pictures[number])
 
 
 def _tell_change(change: ChangeView) -> None:

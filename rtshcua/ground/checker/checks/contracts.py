@@ -23,8 +23,8 @@ from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.symbols import suggestion
 from rtshcua.ground.checker.types import DURATION, HEIGHT, LENGTH, POSITION, SPEED, ZONE, Kind, Type
-from rtshcua.ground.geometry.levels import CLOSED
-from rtshcua.ground.geometry.survey import DEFAULT_PATTERN
+from rtshcua.ground.geometry.levels import INWARD
+from rtshcua.ground.geometry.survey import ALL_PATTERNS, DEFAULT_PATTERN, SIDEWAYS
 from rtshcua.model.durability import BUFFERED, WORDS, WRITTEN
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.contract import TimingClass
@@ -40,7 +40,7 @@ KINDS = ("intent", "decision", "state", "authorization", "effect")
 #: the words of a `record` clause: kinds of evidence and durabilities
 RECORDS = (*KINDS, *DURABILITIES)
 #: survey patterns of a `cover` motion
-PATTERNS = ("grid", "perimeter", "orbit")
+PATTERNS = ALL_PATTERNS
 
 
 def check_contracts(context: CheckContext) -> None:
@@ -104,6 +104,8 @@ def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
     _parameter(context, skill, motion.every, LENGTH)
     _parameter(context, skill, motion.speed, SPEED)
     _parameter(context, skill, motion.time, DURATION)
+    _parameter(context, skill, motion.distance, LENGTH)
+    _distance(context, skill, motion.distance)
     _parameter(context, skill, motion.target, ZONE if motion.kind == "cover" else POSITION)
     if motion.kind == "fly" and motion.target is not None:
         first = next((p for p in skill.parameters if p.type.text == "position"), None)
@@ -121,6 +123,14 @@ def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
         else:
             for choice in argument.declaration.choices:
                 one_of(context, codes.BAD_MOTION, choice, PATTERNS, "survey pattern")
+                if choice.text in SIDEWAYS and motion.distance is None:
+                    context.report.add(
+                        codes.BAD_MOTION,
+                        choice.span,
+                        f"the pattern `{choice.text}` needs a distance from the structure, and the motion names none",
+                        help="add a parameter such as `away: length in 5 m .. 30 m`, and `distance away` to the motion",
+                        labels=[(motion.span, "the motion")],
+                    )
     if motion.facing is not None:
         _facing(context, skill, motion)
 
@@ -129,7 +139,7 @@ def _facing(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
     """Report an open path that faces inward: it has no middle."""
     wanted = None if motion.pattern is None else motion.pattern.text
     choices = [choice for each in skill.parameters if each.name.text == wanted for choice in each.choices]
-    pattern = next((choice for choice in choices if choice.text not in CLOSED), None)
+    pattern = next((choice for choice in choices if choice.text not in INWARD), None)
     if pattern is None and choices:
         return
     context.report.add(
@@ -137,7 +147,7 @@ def _facing(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
         motion.span,
         f"a path `facing inward` goes around something, and a `{DEFAULT_PATTERN if pattern is None else pattern.text}` "
         "does not",
-        help="name a pattern: a choice among " + ", ".join(f"`{each}`" for each in CLOSED),
+        help="name a pattern: a choice among " + ", ".join(f"`{each}`" for each in INWARD),
         labels=[] if pattern is None else [(pattern.span, "this pattern is open")],
     )
 
@@ -148,6 +158,16 @@ def _parameter(context: CheckContext, skill: SkillDecl, name: Name | None, type:
     argument = context.arguments(skill).get(name.text)
     if argument is None or argument.type != type:
         _not_parameter(context, skill, name, type.describe())
+
+
+def _distance(context: CheckContext, skill: SkillDecl, name: Name | None) -> None:
+    """Report a distance from a structure that may be negative."""
+    argument = None if name is None else context.arguments(skill).get(name.text)
+    range = None if argument is None else argument.declaration.range
+    if argument is not None and range is not None and argument.type == LENGTH and (argument.low or 0) < 0:
+        context.report.add(
+            codes.NOT_POSITIVE, range.low.span, f"`{context.report.text(range.low.span)}` must not be negative"
+        )
 
 
 def _not_parameter(context: CheckContext, skill: SkillDecl, name: Name, expected: str) -> None:

@@ -2,16 +2,19 @@
 
 from typing import Any
 
-from rtshcua.diagnostics.codes import BAD_PERIOD, NOT_WRITTEN, SYNTAX
+from rtshcua.diagnostics.codes import BAD_PERIOD, NOT_EXACT, NOT_WRITTEN, SYNTAX, UNKNOWN_UNIT
 from rtshcua.diagnostics.excerpt import short
 from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.language.build.literals import DAYS, LAST_US
 from rtshcua.ground.language.build.reader import Action, Part, Reader, node, part, several
+from rtshcua.ground.language.exact_values import exact_in
 from rtshcua.model.ir.expression import Coordinates, Quantity, TimeOfDay
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import (
     Acceleration,
     Braking,
+    CameraDecl,
     Circle,
     Combination,
     Corridor,
@@ -19,13 +22,14 @@ from rtshcua.model.ir.places import (
     Dates,
     GeoJson,
     NamedSpeed,
+    OpticalLength,
     Polygon,
     Shape,
     VehicleDecl,
     ZoneDecl,
 )
 from rtshcua.model.ir.signals import EnumDecl, Enumerator, Selected, SignalDecl, SourceDecl
-from rtshcua.model.quantity import UNITS, Dimension
+from rtshcua.model.quantity import UNITS, Dimension, UnitOfMeasure
 
 #: the keys of the two kinds of `active` parts
 DAILY, DATES = "active (times of day)", "active (dates)"
@@ -34,6 +38,13 @@ FULL = 100 * UNITS["%"].numerator
 
 #: The most battery cells in series.
 MOST_CELLS = 48
+
+#: The units of sensors, focal lengths and pixels, in um, and the largest value.
+OPTICAL = {
+    name: UnitOfMeasure(Dimension.LENGTH, um)
+    for name, um in (("um", 1), ("mm", 1_000), ("cm", 10_000), ("m", 1_000_000))
+}
+MOST_OPTICAL = 1_000_000
 
 #: the required parts of a vehicle
 REQUIRED = ("identity", "home", "speed", "climb", "position error", "energy", "reserve")
@@ -245,10 +256,36 @@ def clock(reader: Reader, span: Span, sign: str, offset: TimeOfDay) -> Part:
     return Part("clock", span, Quantity(span=span, value=value, dimension=Dimension.DURATION))
 
 
+def optical(reader: Reader, span: Span, number: str, unit: str) -> OpticalLength:
+    """`13.2 mm`, in whole um."""
+    scale = OPTICAL.get(unit)
+    if scale is None:
+        help = f"its units are {listed(OPTICAL)}, as in `13.2 mm`"
+        reader.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit of a sensor, a focal length or a pixel", span, help)
+        return OpticalLength(span=span, value=1)
+    found = exact_in(number, scale)
+    if found.trouble is not None or not 0 < found.value <= MOST_OPTICAL:
+        said = short(reader.source.slice(span))
+        help = "write a length from 1 um to 1 m, as in `13.2 mm` or `4.4 um`"
+        reader.report(NOT_EXACT, f"`{said}` is not a whole number of um between 1 um and 1 m", span, help)
+    return OpticalLength(span=span, value=found.value)
+
+
+def camera(reader: Reader, span: Span, name: Name, *values: Any) -> Part:
+    """`camera mapper sensor 13.2 mm by 8.8 mm focal 8.8 mm pixels 5472 by 3648 ...`."""
+    reader.undotted(name, "camera")
+    width, height, focal, columns, rows, interval, exposure, portrait = values
+    made = CameraDecl(
+        span=span, name=name, width=width, height=height, focal=focal, columns=columns, rows=rows, interval=interval,
+        exposure=exposure, portrait=portrait is not None,
+    )  # fmt: skip
+    return Part("camera", span, made)
+
+
 def vehicle(reader: Reader, span: Span, name: Name, *given: Part) -> None:
     """`vehicle quad { ... }`."""
     reader.undotted(name, "vehicle")
-    found = reader.parts("vehicle", name, given, REQUIRED)
+    found = reader.parts("vehicle", name, given, REQUIRED, listed=("camera",))
     if not reader.sound:
         reader.abandon(name)
         return
@@ -280,6 +317,7 @@ def vehicle(reader: Reader, span: Span, name: Name, *given: Part) -> None:
             wind=found.get("wind"),
             flight=flight,
             cells=found.get("cells"),
+            cameras=tuple(found["camera"]),
         ),
         name,
     )

@@ -18,6 +18,7 @@ from rtshcua.model.ir.skills import (
     LinkDecl,
     MotionDecl,
     ParameterDecl,
+    PicturesDecl,
     Sized,
     SizesDecl,
     SkillDecl,
@@ -57,10 +58,16 @@ def _clauses_of(reader: Reader, span: Span, condition: Condition, fitted: bool |
 FORMS: dict[str, Action] = {
     "climb_to": part("motion", node(MotionDecl, "altitude", kind="climb")),
     "fly_to": part("motion", node(MotionDecl, "target", "altitude", "speed", kind="fly")),
-    "cover_area": part("motion", node(MotionDecl, "target", "altitude", "pattern", "facing", "speed", kind="cover")),
+    "cover_area": part(
+        "motion", node(MotionDecl, "target", "altitude", "distance", "pattern", "facing", "speed", kind="cover")
+    ),
     "cover_levels": part(
         "motion",
-        node(MotionDecl, "target", "lowest", "altitude", "every", "pattern", "facing", "speed", kind="cover"),
+        node(
+            MotionDecl,
+            *("target", "lowest", "altitude", "every", "distance", "pattern", "facing", "speed"),
+            kind="cover",
+        ),
     ),
     "hold_for": part("motion", node(MotionDecl, "kind", "time")),
     "stay": part("motion", node(MotionDecl, "kind")),
@@ -219,6 +226,20 @@ def sized(reader: Reader, span: Span, word: str, size: Reference, phases: tuple[
     return Part(str(word), span, (made, phases or ()) if word == "valid" else made)
 
 
+#: the parts of `pictures`, in their order
+_SHOWN: Final = ("every", "resolution", "forward", "side", "blur", "relief")
+
+
+def pictures(reader: Reader, span: Span, camera: Name, *shown: Any) -> Part:
+    """`pictures by mapper every 10 m resolution finest overlap 80 % forward 70 % side`."""
+    reader.undotted(camera, "camera")
+    written = dict(zip(_SHOWN, shown, strict=True))
+    sized = [Sized(span=each.span, part=name, size=each) for name, each in written.items()  # type: ignore[arg-type]
+             if isinstance(each, Reference)]  # fmt: skip
+    plain = {name: None if isinstance(each, Reference) else each for name, each in written.items()}
+    return Part("pictures", span, (PicturesDecl(span=span, camera=camera, **plain), tuple(sized)))
+
+
 def own_sizes(reader: Reader, span: Span, parameters: tuple[ParameterDecl, ...]) -> tuple[ParameterDecl, ...]:
     """`sizes (highest: altitude in 10 m .. 500 m = 60 m)`, of a skill."""
     return parameters
@@ -243,6 +264,7 @@ def skill(
     validity, phases = found.get("valid", (None, ()))
     amounts = {"validity": validity} | {part: found.get(word) for word, part in _SIZED.items() if word != "valid"}
     plain = {part: None if isinstance(amount, Sized) else amount for part, amount in amounts.items()}
+    shown, sized_shown = found.get("pictures", (None, ()))
     reader.declare(
         SkillDecl(
             span=span,
@@ -262,8 +284,9 @@ def skill(
             energy=plain["energy"],
             record=found.get("record", ()),
             sizes=sizes or (),
-            sized=tuple(amount for amount in amounts.values() if isinstance(amount, Sized)),
+            sized=(*(amount for amount in amounts.values() if isinstance(amount, Sized)), *sized_shown),
             accepts=tuple(found["accepts"]),
+            pictures=shown,
         ),
         name,
     )

@@ -16,7 +16,8 @@ from rtshcua.model.ir.expression import (
     TimeOfDay,
     Value,
 )
-from rtshcua.model.quantity import Datum, Dimension, display
+from rtshcua.model.ir.places import OpticalLength
+from rtshcua.model.quantity import Datum, Dimension, display, micrometres
 
 #: a name, or a pair of brackets without brackets in it
 _CLOSED: Final = re.compile(r"`[^`]*`|\([^()`]*\)")
@@ -103,6 +104,11 @@ def quantity(one: Quantity) -> str:
     if one.datum is None:
         return f"{words} above home" if one.dimension is Dimension.ALTITUDE else words
     return f"{words} above {'home' if one.datum is Datum.HOME else 'sea level'}"
+
+
+def optical(one: OpticalLength) -> str:
+    """A length of a camera."""
+    return micrometres(one.value)
 
 
 def coordinates(place: Coordinates) -> str:

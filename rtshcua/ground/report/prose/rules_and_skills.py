@@ -5,8 +5,17 @@ from typing import Final
 
 from rtshcua.ground.geometry.survey import DEFAULT_PATTERN
 from rtshcua.ground.report.prose.condition_phrases import describe_condition
-from rtshcua.ground.report.prose.phrases import Vocabulary, between, describe_value, listed, name, named, sentence
+from rtshcua.ground.report.prose.phrases import (
+    Vocabulary,
+    between,
+    describe_value,
+    listed,
+    name,
+    named,
+    sentence,
+)
 from rtshcua.model.durability import WORDS as DURABILITIES
+from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.policies import AirspaceDecl, Delegation, RuleDecl, Use
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SourceDecl
@@ -18,11 +27,12 @@ from rtshcua.model.ir.skills import (
     LinkDecl,
     MotionDecl,
     ParameterDecl,
+    PicturesDecl,
     SkillDecl,
     SourcedArgument,
     Substitute,
 )
-from rtshcua.model.quantity import Dimension, display
+from rtshcua.model.quantity import Dimension, display, micrometres
 
 _TYPES: Final = {
     "zone": "a zone",
@@ -62,7 +72,19 @@ PATTERNS: Final = {
     "16 straight legs, from the east. Holes are not gone around",
     "orbit": "once around the middle of the area, counter-clockwise, on 16 straight legs from the east, on the largest "
     "circle that lies in it and keeps clear of its edge; an area with a hole in the way has none",
+    "corridor": "along the line of a corridor, to and fro on as many parallel lines as its width needs, evenly spaced "
+    "as in a grid; outside of a bend a line has two corners, so that it stays in the corridor",
+    "face": "once along a straight face, at the distance asked for to the left of its line, the camera to the right",
+    "around": "once around the structure in the hole of the area, counter-clockwise, on 16 legs from the east, "
+    "which touch the circle at the distance asked for from the smallest one around the middle of the structure that "
+    "encloses it, with the camera to the middle",
 }
+#: the grid where the pictures state an overlap to the side
+_BY_OVERLAP: Final = (
+    "back and forth on parallel lines along the longest edge, evenly spaced and no further apart than the overlap of "
+    "the pictures allows at the height, in at most 256 lines; the first and the last are half a spacing inside. It "
+    "begins at the end that is nearer to the entry of the area, where it has one, and goes around holes"
+)
 #: docs/log-format.md, section 4
 _DURABLE: Final = {
     "buffered": "its record is handed to the writer before it begins",
@@ -94,6 +116,8 @@ def describe_motion(motion: MotionDecl | None) -> str:
             words = "stays where it is"
         case "land":
             words = "lands where it is"
+    if motion.distance is not None:
+        words += f", {_given(motion.distance)} away from a structure"
     if motion.pattern is not None:
         words += f", in {_given(motion.pattern)}"
     if motion.facing is not None:
@@ -112,8 +136,33 @@ def describe_patterns(skill: SkillDecl) -> Iterator[tuple[str, str]]:
         return
     wanted = None if motion.pattern is None else motion.pattern.text
     choices = [choice.text for each in skill.parameters if each.name.text == wanted for choice in each.choices]
+    by_overlap = skill.pictures is not None and skill.pictures.side is not None
     for pattern in choices or [DEFAULT_PATTERN]:
-        yield pattern, PATTERNS[pattern]
+        yield pattern, _BY_OVERLAP if by_overlap and pattern == "grid" else PATTERNS[pattern]
+
+
+def describe_pictures(pictures: PicturesDecl | None) -> str:
+    """Describe what the pictures of a survey must show, as proved; empty if the skill states none."""
+    if pictures is None:
+        return ""
+    every = "" if pictures.every is None else f" every {display(pictures.every.value, pictures.every.dimension)}"
+    kept = []
+    if pictures.resolution_um is not None:
+        kept.append(f"a pixel shows at most {micrometres(pictures.resolution_um)}")
+    if pictures.forward is not None and pictures.side is not None:
+        along, beside = _share(pictures.forward), _share(pictures.side)
+        kept.append(f"pictures overlap by {along} along the path and {beside} beside it")
+    if pictures.blur is not None:
+        kept.append(f"they smear by at most {_share(pictures.blur)} of a pixel")
+    if pictures.relief is not None and pictures.relief.value:
+        relief = display(pictures.relief.value, Dimension.LENGTH)
+        kept.append(f"for ground up to {relief} above or below home")
+    proved = f"; proved before the flight: {listed(kept)}" if kept else ""
+    return f" It takes pictures with the camera {name(pictures.camera.text)}{every}{proved}."
+
+
+def _share(quantity: Quantity) -> str:
+    return display(quantity.value, Dimension.RATIO)
 
 
 def _given(parameter: object) -> str:

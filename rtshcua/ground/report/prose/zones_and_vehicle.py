@@ -12,6 +12,7 @@ from rtshcua.ground.report.prose.phrases import (
     name,
     named,
     on_days,
+    optical,
     quantity,
     time_of_day,
     whole_day,
@@ -19,6 +20,7 @@ from rtshcua.ground.report.prose.phrases import (
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import (
+    CameraDecl,
     Circle,
     Combination,
     Corridor,
@@ -123,6 +125,18 @@ def describe_fitted(signal: str, fitted: bool) -> str:
     return f"The vehicle does not report {name(signal)}: its clauses `where fitted` do not apply."
 
 
+def _camera(camera: CameraDecl) -> str:
+    """Describe a camera."""
+    sensor = f"a sensor of {optical(camera.width)} by {optical(camera.height)}"
+    pixels = f"{camera.columns.value} by {camera.rows.value} pixels"
+    mounted = ", mounted portrait" if camera.portrait else ""
+    times = f"a picture every {quantity(camera.interval)} at the most often, exposed for at most"
+    return (
+        f"{name(camera.name.text)}: {sensor}, {pixels}, {optical(camera.focal)} behind the lens{mounted}; {times} "
+        f"{quantity(camera.exposure)}"
+    )
+
+
 def describe_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     """Yield the properties of a vehicle, each with its label."""
     yield "Identity", vehicle.identity
@@ -164,6 +178,7 @@ def describe_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
         yield "Local time", f"UTC {'-' if offset < 0 else '+'}{time_of_day(abs(offset))}"
     if vehicle.time_zone is not None:
         yield "Local time", f"that of {vehicle.time_zone.text}, by the time-zone data {time_zones.VERSION}"
+    yield from (("Camera", _camera(camera)) for camera in vehicle.cameras)
     if vehicle.without:
         signals = named([each.text for each in vehicle.without])
         yield "Not fitted", f"sensors for {signals}; clauses that count only where they are fitted are left out"

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from reference.mapping import PROGRAM
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.exits import ExitCode
@@ -351,3 +352,17 @@ def test_dated_zone_is_checked_at_the_given_time(
 def test_invalid_time_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "policy.rts", "--at", "noon"]) == ExitCode.USAGE
     assert "`noon` is not a UTC time" in capsys.readouterr().err
+
+
+def test_pictures_of_a_survey_are_printed_below_its_step(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("map.rts").write_text(PROGRAM, encoding="utf-8")
+    assert main(["check", "map.rts"]) == ExitCode.OK
+    lines = capsys.readouterr().out.splitlines()
+    at = next(number for number, line in enumerate(lines) if line.startswith("  2 look: at most "))
+    assert lines[at + 1].startswith("    mapper, grid: 13.707 mm per pixel, pictures of 75 m by 50 m, overlap 84 %")
+    assert lines[at + 3].startswith("  3 return_home")
+    code, told = answer(capsys, "map.rts")
+    (one,) = told["missions"][0]["pictures"]
+    assert (code, one["step_number"], one["camera"], one["pixel_um"], one["forward"]) == (0, 2, "mapper", 13_707, 8_400)
+    code, told = answer(capsys, "a")
+    assert (code, told["missions"][0]["pictures"]) == (0, [])

@@ -7,6 +7,7 @@ import pytest
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.editor.hover import hover
 from rtshcua.ground.editor.navigation import definitions, references, targets
+from rtshcua.ground.editor.occurrences import at
 from rtshcua.ground.editor.workspace import Workspace
 from rtshcua.library import root
 from rtshcua.mavlink import dialect
@@ -179,6 +180,34 @@ def test_hover_describes_what_a_skill_accepts(desk: Workspace, around: str, said
     found = hover(desk.view("/w/s.rts"), "/w/s.rts", place(desk, "/w/s.rts", around), dialect.load())
     assert found is not None
     assert [each for each in said if each not in found.text] == []
+
+
+@pytest.mark.parametrize(
+    ("around", "places", "said"),
+    [
+        ("pictures by e|ye", ["camera ^eye", "by ^eye"], "camera `eye`"),
+        ("distance aw|ay", ["^away: length", "distance ^away"], "parameter of `look_at`"),
+    ],
+)
+def test_cameras_and_distances_have_a_declaration(desk: Workspace, around: str, places: list[str], said: str) -> None:
+    text = """vehicle mapping_quad {
+  identity "m-1"  home 47.39774 N, 8.54559 E within 50 m  speed at most 12 m/s  climb at most 3 m/s
+  position error 3 m  energy 100 % = 18 min hover  reserve 15 %
+  camera eye sensor 13.2 mm by 8.8 mm focal 8.8 mm pixels 5472 by 3648 every at least 700 ms exposure at most 1 ms
+}
+skill look_at(area: zone, up: altitude in 3 m .. 60 m, away: length in 5 m .. 9 m, way: one of face) {
+  motion   cover area at up distance away pattern way
+  pictures by eye every 10 m
+}
+"""
+    desk.put("/w/s.rts", text)
+    view, offset = desk.view("/w/s.rts"), place(desk, "/w/s.rts", around)
+    found = hover(view, "/w/s.rts", offset, dialect.load())
+    assert found is not None
+    assert said in found.text
+    target = at(view.occurrences("/w/s.rts"), offset)[0].target
+    spans = sorted(each.span.start for each in view.occurrences("/w/s.rts") if each.target == target)
+    assert spans == [text.index(each.replace("^", "")) + each.index("^") for each in places]
 
 
 def test_hover_is_empty_without_a_name(desk: Workspace) -> None:

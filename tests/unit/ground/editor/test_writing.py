@@ -22,6 +22,15 @@ POLICY = HEAD + "policy p version 1 {\n  "
 VEHICLE = HEAD + "vehicle v {\n  "
 SCENARIO = 'import "dip.rts"\nscenario "s" {\n  '
 MISSION = HEAD + "mission m under lake@1 on quad {\n  "
+MAPPING = (
+    HEAD
+    + """vehicle mapping_quad {
+  identity "m-1"  home 47.39774 N, 8.54559 E within 50 m  speed at most 12 m/s  climb at most 3 m/s
+  position error 3 m  energy 100 % = 18 min hover  reserve 15 %
+  camera eye sensor 13.2 mm by 8.8 mm focal 8.8 mm pixels 5472 by 3648 every at least 700 ms exposure at most 1 ms
+}
+"""
+)
 SKILL = HEAD + "skill s(far: length in 1 m .. 5 m, area: zone) {\n  "
 
 
@@ -102,6 +111,9 @@ def proposed(desk: Workspace, before: str, after: str = "") -> dict[str, str]:
         (SKILL + "class ", ["tactical", "semantic", "reflex"], ["decision"]),
         (SKILL + "record intent, ", ["decision", "synced_first"], ["tactical"]),
         (SKILL + "motion cover ", ["area", "far"], ["pond"]),
+        (SKILL + "motion cover area at far distance ", ["far"], ["pond"]),
+        (MAPPING + "skill s() {\n  pictures by ", ["eye"], ["pond", "agent"]),
+        (MAPPING + "skill s() {\n  pictures by eye ", ["every", "resolution", "blur"], ["eye"]),
         (SKILL + "require far < 3 ", ["m", "cm"], ["s", "%"]),
         (SKILL + "deadline 5 ", ["s", "min"], []),
         (SKILL + "fallback ", ["hover", "goto"], ["pond"]),

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from reference.mapping import SIDEWAYS, checked, program
 from rtshcua.decision import prepare
 from rtshcua.diagnostics import codes
 from rtshcua.ground.language.load import load
-from rtshcua.ground.lower.signed_paths import PlannedPath, path_planned_otherwise
+from rtshcua.ground.lower.signed_paths import PlannedPath, other_spacing, path_planned_otherwise
 from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
 from rtshcua.model.flat.mission import Invocation
@@ -148,3 +149,43 @@ def test_survey_with_too_many_edge_comparisons_is_reported(monkeypatch: pytest.M
     found = compile_program(program, dialect.load(), mission=None, issued_at_us=0)
     (told,) = [each.message for each in found.diagnostics if each.code is codes.TOO_MANY]
     assert told.endswith("the legs of its paths would be compared with more than 3 edges of zones")
+
+
+def surveyed(*changes: tuple[str, str]) -> tuple[Policy, Invocation]:
+    """The policy and the survey of the program with a camera."""
+    found = checked(program(*changes))
+    assert found.diagnostics == (), found.diagnostics[0].message
+    (planned,) = found.planned
+    return planned.under.policy, planned.mission.invocations[1]
+
+
+def test_grid_of_a_camera_is_the_planners_with_its_spacing() -> None:
+    policy, one = surveyed()
+    assert path_planned_otherwise(policy, one) is None
+    told = checked(program()).pictures["flight"][0].lines_apart
+    assert told is not None
+    found = other_spacing(policy, one)
+    assert found is not None
+    assert abs(found - told) <= 2
+    turned = [coordinate for at in range(len(one.plan.path) - 2, -1, -2) for coordinate in one.plan.path[at : at + 2]]
+    assert other_spacing(policy, along(one, *turned)) == found
+    moved = along(one, one.plan.path[0] + 30, *one.plan.path[1:])
+    assert path_planned_otherwise(policy, moved) is not None
+    assert other_spacing(policy, moved) is None
+
+
+def test_spacing_that_the_height_gives_is_not_told() -> None:
+    assert other_spacing(*compiled(CALLS[3])) is None
+    assert other_spacing(*compiled(CALLS[4])) is None, "a perimeter has no lines"
+
+
+def test_path_around_a_structure_is_computed_again_and_one_along_a_line_is_not() -> None:
+    policy, one = surveyed(*SIDEWAYS, ("15 m", "14 m"), ("field, 50 m", "tower, 50 m, pattern = around"))
+    assert path_planned_otherwise(policy, one) is None
+    found = path_planned_otherwise(policy, along(one, *one.plan.path[:-2]))
+    assert found is not None
+    assert (found.points, found.computable) == (17, True)
+    for changes in ([("field, 50 m", "road, 50 m, pattern = corridor")],
+                    [*SIDEWAYS, ("15 m", "14 m"), ("field, 50", "wall, 50")]):  # fmt: skip
+        policy, one = surveyed(*changes)
+        assert path_planned_otherwise(policy, one) == PlannedPath(0, 0, 0, computable=False)

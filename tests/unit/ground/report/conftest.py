@@ -40,7 +40,8 @@ def part_of(path: Path) -> ReportPart:
         compiled = compile_program(program, dialect.load(), mission=mission.name.text, issued_at_us=0)
         assert compiled.policy is not None
         assert compiled.mission is not None
-        flown.append(CompiledMission(compiled.policy, compiled.mission, mission, checked.bounds.get(mission.name.text)))
+        bounds, pictures = checked.bounds.get(mission.name.text), checked.pictures[mission.name.text]
+        flown.append(CompiledMission(compiled.policy, compiled.mission, mission, bounds, pictures))
     tried = DecidedCases(program, tuple(run_case(case) for case in suite(program, dialect.load()).cases))
     return ReportPart(
         program, checked.policies, tuple(flown), checked.diagnostics, (tried,), program.units[0].scenarios

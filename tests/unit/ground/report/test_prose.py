@@ -25,6 +25,7 @@ from rtshcua.ground.report.prose.rules_and_skills import (
     describe_members,
     describe_motion,
     describe_parameter,
+    describe_pictures,
     describe_record,
     describe_rule,
     describe_silence,
@@ -188,7 +189,7 @@ def tell_zone(zone: ZoneDecl) -> object:
 def tell_skill(skill: SkillDecl, names: Vocabulary) -> object:
     return (
         skill.name.text,
-        describe_motion(skill.motion),
+        describe_motion(skill.motion) + describe_pictures(skill.pictures),
         [(each.name.text, describe_parameter(each, names)) for each in skill.parameters],
         list(describe_timing(skill)),
         [[describe_clause(each, names) for each in some] for some in (skill.require, skill.assume, skill.maintain)],

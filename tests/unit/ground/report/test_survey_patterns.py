@@ -1,20 +1,26 @@
 """The descriptions of the survey patterns agree with the planner."""
 
+import os
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from math import hypot
+from pathlib import Path
 
 import pytest
 
+from reference.mapping import PROGRAM
 from rtshcua.ground.checker.checks.contracts import PATTERNS as KNOWN
 from rtshcua.ground.geometry.shapes import RoundArea, SimplePolygon
 from rtshcua.ground.geometry.survey import survey
-from rtshcua.ground.report.html_page import page
+from rtshcua.ground.report.html_page import page, pattern_picture
 from rtshcua.ground.report.html_page import pattern as drawn
+from rtshcua.ground.report.policy_report import ReportPart, policy_report
 from rtshcua.ground.report.prose.rules_and_skills import PATTERNS
 from rtshcua.ground.report.report_model import PolicyReport
 
 M = 1_000
+DOCS = Path(__file__).resolve().parents[4] / "docs"
 HOUSE = SimplePolygon(((0, 0), (120 * M, 0), (150 * M, 55 * M), (120 * M, 90 * M), (0, 90 * M)))
 ROUND = RoundArea((0, 0), 50 * M)
 
@@ -24,10 +30,32 @@ def turned(points: tuple[tuple[int, int], ...]) -> int:
     return sum(ax * by - bx * ay for (ax, ay), (bx, by) in pairwise(points))
 
 
+def test_pictures_of_a_survey_are_described_with_the_skill_and_the_step(
+    tmp_path: Path, part: Callable[[Path], ReportPart]
+) -> None:
+    (tmp_path / "map.rts").write_text(PROGRAM, encoding="utf-8")
+    text = page(policy_report([part(tmp_path / "map.rts")], made_at_us=0, made_by="rtshcua")).replace("\u00a0", " ")
+    assert "Pictures by mapper, grid: 13.707 mm per pixel, pictures of 75 m by 50 m, overlap 84 % forward, " in text
+    assert "It takes pictures with the camera <code>mapper</code> every 8 m; proved before the flight: a pixel " in text
+    assert "no further apart than the overlap of the pictures allows" in text
+    assert "<code>mapper</code>: a sensor of 13.2 mm by 8.8 mm, 5472 by 3648 pixels, 8.8 mm behind the lens" in text
+
+
 def test_each_pattern_has_a_description_and_a_drawing() -> None:
     assert set(PATTERNS) == set(KNOWN)
-    for name in KNOWN:
-        assert len(drawn(name).arrows) > 3
+    assert [name for name in KNOWN if len(drawn(name).arrows) <= 3] == ["face"], "which is one leg"
+    assert [name for name in KNOWN if drawn(name).structure] == ["corridor", "face", "around"]
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_picture_of_the_documentation_is_drawn_from_the_real_path(name: str) -> None:
+    """`UPDATE_GOLDENS=1` draws them anew: look at the difference."""
+    file = DOCS / "patterns" / f"{name}.svg"
+    found = pattern_picture(name)
+    if os.environ.get("UPDATE_GOLDENS"):
+        file.write_text(found, encoding="utf-8")
+    assert found == file.read_text(encoding="utf-8")
+    assert f"patterns/{name}.svg" in (DOCS / "survey.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("height", "apart"), [(20 * M, 20 * M), (3 * M, 5 * M)])

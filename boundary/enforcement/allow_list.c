@@ -3,7 +3,6 @@
 
 #define AREAS 4 /* a bit of FENCE_TYPE */
 #define GROUND_STATION 255
-#define DATUM_MOVES 2000 /* mm */
 #define ROUNDING 2       /* mm, mm/s */
 #define NEAR 449         /* 1e-7 degree of latitude */
 
@@ -173,7 +172,7 @@ static bool is_long(const rt_frame *frame, const rt_command *command, uint8_t au
         if (autopilot == RT_MAV_AUTOPILOT_PX4) /* it climbs at a finite place, turned to a finite heading */
             return rt_is_nan(p[4]) && rt_is_nan(p[5]) && rt_is_nan(p[6]) && (rt_is_nan(p[1]) || rt_is_zero(p[1])) &&
                    rt_is_zero(p[2]) && rt_is_zero(p[3]) && home_known &&
-                   is_about(p[7], home_amsl + command->altitude, DATUM_MOVES);
+                   is_about(p[7], home_amsl + command->altitude, RT_DATUM_MOVES);
         for (uint32_t at = 1; at <= 6; at++)
             if (!rt_is_zero(p[at]))
                 return false;
@@ -207,7 +206,7 @@ static bool repositions(const rt_frame *frame, const rt_command *command, bool h
     uint32_t speed = rt_u32(frame, RT_COMMAND_INT_PARAM1);
     rt_point there = {rt_i32(frame, RT_COMMAND_INT_X), rt_i32(frame, RT_COMMAND_INT_Y)};
     return is_reposition(frame) && travels(command) && home_known &&
-           is_about(rt_u32(frame, RT_COMMAND_INT_Z), home_amsl + command->altitude, DATUM_MOVES) &&
+           is_about(rt_u32(frame, RT_COMMAND_INT_Z), home_amsl + command->altitude, RT_DATUM_MOVES) &&
            rt_is_nan(rt_u32(frame, RT_COMMAND_INT_PARAM4)) && rt_is_zero(rt_u32(frame, RT_COMMAND_INT_PARAM3)) &&
            (command->speed != 0 ? is_speed(speed, command) : rt_is_whole(speed, -1)) && is_point(there, command);
 }

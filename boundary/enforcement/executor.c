@@ -65,6 +65,7 @@ static bool command_of(const rt_executor *executor, const rt_permit *permit, rt_
         command->altitude = invocation.plan.altitude;
         command->speed = invocation.plan.speed;
         command->path = invocation.plan.path;
+        rt_payload_of(&invocation, policy, command);
         return true;
     }
     int64_t rule = -1 - permit->link, number = permit->link;

@@ -4,6 +4,7 @@
 
 #include "allow_list.h"
 #include "mavlink/signing.h"
+#include "payload_gate.h"
 #include "wire/boundary_chain.h"
 #include "wire/preparation.h"
 
@@ -18,6 +19,7 @@ typedef struct {
     int64_t leg;          /* the last point of its path that was sent, -1 before */
     bool here_known;
     rt_point here;
+    rt_payload_gate payload;
     bool let_out; /* a frame was sent or signed ahead since the last permit */
     bool started; /* a session was opened: fences are no longer changed */
     uint8_t system, autopilot, kind; /* of its heartbeat */

@@ -1,7 +1,7 @@
 #include "artefact.h"
 
 const rt_artefact RT_ROOT = RT_ARTEFACT("root", 2, RT_MANY_ITEMS);
-const rt_artefact RT_POLICY = RT_ARTEFACT("policy", 7, RT_ANY_ITEMS);
+const rt_artefact RT_POLICY = RT_ARTEFACT("policy", 8, RT_ANY_ITEMS);
 const rt_artefact RT_MISSION = RT_ARTEFACT("mission", 1, RT_ANY_ITEMS);
 const rt_artefact RT_BUNDLE = RT_ARTEFACT("bundle", 1, RT_FEW_ITEMS);
 const rt_artefact RT_APPROVAL = RT_ARTEFACT("approval", 2, RT_FEW_ITEMS);

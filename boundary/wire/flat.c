@@ -56,17 +56,31 @@ static bool parameter(rt_cursor *cursor, rt_parameter *into) {
            INT(into->high) && rt_take_texts(cursor, &into->labels);
 }
 
+static bool emission_parameter(rt_cursor *cursor, rt_emission_parameter *into) {
+    return STRUCT(3) && INT(into->origin) && INT(into->cell) && INT(into->value);
+}
+
+static LIST(emission_parameters, rt_emission_parameter, emission_parameter)
+
+static bool emission(rt_cursor *cursor, rt_emission *into) {
+    rt_bytes text;
+    return STRUCT(10) && INT(into->command) && INT(into->addressee) && emission_parameters(cursor, &into->parameters) &&
+           INT(into->moment) && INT(into->amount) && INT(into->success) && INT(into->bound) && INT(into->within_us) &&
+           INT(into->required) && TEXT(text);
+}
+
+static LIST(emissions, rt_emission, emission)
 static LIST(clauses, rt_clause, clause)
 static LIST(links, rt_link, link)
 static LIST(parameters, rt_parameter, parameter)
 
 static bool contract(rt_cursor *cursor, rt_contract *into) {
-    return STRUCT(16) && TEXT(into->name) && parameters(cursor, &into->parameters) && STRUCT(4) && INT(into->motion.kind) &&
+    return STRUCT(17) && TEXT(into->name) && parameters(cursor, &into->parameters) && STRUCT(4) && INT(into->motion.kind) &&
            INT(into->motion.altitude) && INT(into->motion.speed) && INT(into->motion.time) && INT(into->timing_class) &&
            INT(into->deadline_us) && INT(into->validity_us) && rt_take_texts(cursor, &into->phases) && INT(into->duration_us) &&
            INT(into->grace_us) && clauses(cursor, &into->require) && clauses(cursor, &into->assume) &&
            clauses(cursor, &into->maintain) && links(cursor, &into->fallback) && INT(into->energy) &&
-           rt_take_texts(cursor, &into->record) && rt_take_ints(cursor, &into->reads);
+           rt_take_texts(cursor, &into->record) && rt_take_ints(cursor, &into->reads) && emissions(cursor, &into->emits);
 }
 
 typedef struct {
@@ -132,14 +146,14 @@ static bool speeds(rt_cursor *cursor, rt_speeds *into) {
 }
 
 static bool vehicle(rt_cursor *cursor, rt_vehicle *into) {
-    if (!STRUCT(23) || !TEXT(into->name) || !TEXT(into->identity) || !INT(into->home_within) || !INT(into->speed) || !INT(into->climb) ||
+    if (!STRUCT(24) || !TEXT(into->name) || !TEXT(into->identity) || !INT(into->home_within) || !INT(into->speed) || !INT(into->climb) ||
         !INT(into->position_error) || !INT(into->endurance_us) || !INT(into->reserve) || !INT(into->utc_offset_us) ||
         !INT(into->position) || !INT(into->height) || !INT(into->battery) || !INT(into->return_altitude) || !INT(into->braking) ||
         !INT(into->reaction_us) || !INT(into->north) || !INT(into->east) || !INT(into->down) || !rt_take_texts(cursor, &into->without))
         return false;
     into->has_speeds = !rt_take_null(cursor);
     return (!into->has_speeds || speeds(cursor, &into->speeds)) && TEXT(into->time_zone) && TEXT(into->time_zone_data) &&
-           rt_take_ints(cursor, &into->offsets);
+           rt_take_ints(cursor, &into->offsets) && rt_take_ints(cursor, &into->servos);
 }
 
 TABLE(roles, rt_bytes, RT_MAX_ROLES, rt_take_text)
@@ -264,6 +278,8 @@ NEXT(rt_next_link, rt_link, link)
 NEXT(rt_next_parameter, rt_parameter, parameter)
 NEXT(rt_next_source, rt_signal_source, signal_source)
 NEXT(rt_next_left_out, rt_left_out, omission)
+NEXT(rt_next_emission, rt_emission, emission)
+NEXT(rt_next_emission_parameter, rt_emission_parameter, emission_parameter)
 
 static bool text_or_octets(rt_cursor *cursor, rt_bytes *into) {
     rt_cursor again = *cursor;

@@ -29,7 +29,7 @@ MANY: Final = 1 << 16
 COMPATIBILITY: Final = "docs/compatibility.md"
 
 ROOT: Final = Artefact("rtshcua/root", 2, items=MANY)  # 2: with policies of mission keys, persons of approval keys
-POLICY: Final = Artefact("rtshcua/policy", 7)  # 7: time zones and days of the week
+POLICY: Final = Artefact("rtshcua/policy", 8)  # 8: commands to payload
 MISSION: Final = Artefact("rtshcua/mission", 1)
 BUNDLE: Final = Artefact("rtshcua/bundle", 1, items=FEW)
 APPROVAL: Final = Artefact("rtshcua/approval", 2, items=FEW)  # 2: names mission and flight

@@ -132,7 +132,7 @@ def _bundle(bundle: bytes, root: Root, vehicle: str, mission: str, now_us: int) 
     policy_payload, _ = _envelope(first, root, "policy", vehicle, now_us)
     mission_payload, key = _envelope(second, root, "mission", vehicle, now_us)
     match _whole(policy_payload), _whole(mission_payload):
-        case ["rtshcua/policy", 7, [*policy]], ["rtshcua/mission", 1, [*flown]]:
+        case ["rtshcua/policy", 8, [*policy]], ["rtshcua/mission", 1, [*flown]]:
             pass
         case _:
             raise Untrusted("not a policy, version 7, and a mission, version 1")

@@ -39,6 +39,11 @@ KEYWORDS: Mapping[str, str] = {
     "record": "The kinds of evidence that are written, and their durability before the command is sent.",
     "accepts": "A command, mission `item`, `message` or flight `mode` of MAVLink by which a client of a gateway means "
     "this skill; `with` names the fields of the arguments, `where` the fields that must have a value.",
+    "emits": "A command to a camera, a gimbal or other payload that the skill sends while it flies: `with` its "
+    "parameters, `at begin`, `at end`, `at each turn`, `at each waypoint`, or `every 10 m`.",
+    "succeeds": "What shows the success of a command to payload: `acknowledgement`, `image` or `attitude`, in a time.",
+    "required": "If this command to payload fails, the step has failed.",
+    "servos": "Outputs that drive no motor and no control surface: skills may set them.",
     "where": "Only if these fields have these values; after a clause, `where fitted`.",
     "here": "Where the vehicle is, or its height.",
     "policy": "Who may request what, where and when. Its version only increases.",

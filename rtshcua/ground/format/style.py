@@ -47,6 +47,7 @@ _PLAIN_ITEMS = (
     # of vehicles
     "identity", "home", "speed", "climb", "position_error", "endurance", "reserve", "cells", "clock", "time_zone",
     "elevation", "return_at", "brakes", "speeds", "accelerates", "wind", "not_fitted",
+    "servos",
     # of skills and steps
     "climb_to", "fly_to", "cover_area", "hold_for", "stay", "timing_class", "deadline", "duration", "grace",
     "require", "assume", "maintain", "fallback", "energy", "record",
@@ -69,6 +70,7 @@ ITEMS = dict.fromkeys(_PLAIN_ITEMS, Style()) | {
     "validity": _style("during"),
     "sized": _style("during"),
     "accepts": _style("where", "with"),
+    "emits": _style("with", "succeeds"),
     "airspace": _style("inside", "outside", aligned=False),
     "phase": _style(aligned=False, cuts=("{",)),
     "asked": _style("by", "through"),

@@ -124,7 +124,8 @@ class VehicleLimits(Flat, frozen=True):
 
     Local time is `utc_offset_us` from UTC. If it is that of a time zone, given by its IANA name, `time_zone_data`
     is the version of the time-zone data, `utc_offset_us` is 0, and `offsets` alternates between a moment (UTC, us)
-    and the offset from it on, and ends with the moment from which local time is unknown.
+    and the offset from it on, and ends with the moment from which local time is unknown. `servos` are the servo
+    outputs that skills may set, ascending.
     """
 
     name: str
@@ -150,6 +151,7 @@ class VehicleLimits(Flat, frozen=True):
     time_zone: str = ""
     time_zone_data: str = ""
     offsets: tuple[int, ...] = ()
+    servos: tuple[int, ...] = ()
 
 
 class LeftOut(Flat, frozen=True):

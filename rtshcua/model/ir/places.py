@@ -148,3 +148,4 @@ class VehicleDecl(Node):
     flight: Quantity | None = None  # how long a full battery lasts, whatever the vehicle flies
     time_zone: Name | None = None  # `clock "Europe/Berlin"`
     cells: Quantity | None = None  # `cells 4`: the number in series, by which `battery.cell` is divided
+    servos: tuple[Quantity, ...] = ()  # `servos 9, 10`: outputs that no part of the vehicle's motion uses

@@ -9,7 +9,7 @@ from virtual.rows import rows
 
 def test_bytes_begin_with_name_and_version():
     data = wrap(names.POLICY, {"a": 1})
-    assert data == b"\x83\x6ertshcua/policy\x07\xa1\x61a\x01"
+    assert data == b"\x83\x6ertshcua/policy\x08\xa1\x61a\x01"
     assert unwrap(names.POLICY, data) == {"a": 1}
 
 
@@ -30,14 +30,14 @@ def test_bytes_begin_with_name_and_version():
         ),
         (wrap(names.MISSION, 1), "unknown-format", "expected `rtshcua/policy`, found `rtshcua/mission`"),
         (
-            cbor.encode(("rtshcua/policy", 8, 1)),
+            cbor.encode(("rtshcua/policy", 9, 1)),
             "unknown-version",
-            "`rtshcua/policy` version 8 is not supported; this program reads version 7",
+            "`rtshcua/policy` version 9 is not supported; this program reads version 8",
         ),
         (
             cbor.encode(("rtshcua/policy", 5, 1)),
             "unknown-version",
-            "`rtshcua/policy` version 5 is not supported; this program reads version 7; "
+            "`rtshcua/policy` version 5 is not supported; this program reads version 8; "
             "see docs/compatibility.md for earlier versions",
         ),
     ],
@@ -60,7 +60,7 @@ def test_anything_else_is_refused(data, slug, text):
         (
             b"\x83\x6ertshcua/policy\x20",
             "unknown-version",
-            "`rtshcua/policy` version -1 is not supported; this program reads version 7; "
+            "`rtshcua/policy` version -1 is not supported; this program reads version 8; "
             "see docs/compatibility.md for earlier versions",
         ),
         (

@@ -65,6 +65,7 @@ FORMS: dict[str, Action] = {
     "accelerates": part("accelerates", node(Acceleration, "speed", "time")),
     "wind": part("wind"),
     "not_fitted": part("without"),
+    "servos": part("servos", several),
 }
 
 
@@ -280,6 +281,7 @@ def vehicle(reader: Reader, span: Span, name: Name, *given: Part) -> None:
             wind=found.get("wind"),
             flight=flight,
             cells=found.get("cells"),
+            servos=found.get("servos", ()),
         ),
         name,
     )

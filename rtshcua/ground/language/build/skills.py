@@ -13,6 +13,8 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import (
     AcceptsDecl,
     ClauseDecl,
+    EmitsDecl,
+    EmittedParameter,
     FixedFieldDecl,
     GivenSize,
     LinkDecl,
@@ -23,6 +25,7 @@ from rtshcua.model.ir.skills import (
     SkillDecl,
     SourcedArgument,
     Substitute,
+    SuccessDecl,
 )
 
 
@@ -37,7 +40,7 @@ class FurtherName(NamedTuple):
 #: the parts of a skill that may be a size, by their first keyword
 _SIZED: Final = {"deadline": "deadline", "valid": "validity", "lasts": "duration", "grace": "grace", "energy": "energy"}
 #: parts of a skill that may repeat: all of them apply
-_REPEATED = ("require", "assume", "maintain", "accepts")
+_REPEATED = ("require", "assume", "maintain", "accepts", "emits")
 #: the form of a parameter's name on both autopilots; MAVLink has 16 characters for it
 _AUTOPILOT_PARAMETER: Final = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 
@@ -76,6 +79,7 @@ FORMS: dict[str, Action] = {
     "fixed_fields": several,
     "sourced_arguments": several,
     "substitute": node(Substitute, "kind"),
+    "emitted_parameters": several,
 }
 
 
@@ -151,6 +155,79 @@ def accepts(
         span=span, kind=kind, name=name, autopilot=autopilot, where=where or (), arguments=arguments or ()
     )
     return Part("accepts", span, made)
+
+
+class EmissionTime(NamedTuple):
+    """When a command to payload is sent."""
+
+    once: Name | None = None
+    each: Name | None = None
+    every: Quantity | None = None
+
+
+def emitted_parameter(reader: Reader, span: Span, field: Name, value: Quantity | Reference) -> EmittedParameter:
+    """`param3 = 1`, `param1 = pitch`."""
+    reader.undotted(field, "parameter")
+    return EmittedParameter(span=span, fields=(field,), value=value)
+
+
+def emitted_place(reader: Reader, span: Span, latitude: Name, longitude: Name, value: Reference) -> EmittedParameter:
+    """`(param5, param6) = target`."""
+    for each in (latitude, longitude):
+        reader.undotted(each, "parameter")
+    return EmittedParameter(span=span, fields=(latitude, longitude), value=value)
+
+
+def once(reader: Reader, span: Span, name: Name) -> EmissionTime:
+    """`at begin`."""
+    return EmissionTime(once=name)
+
+
+def each_time(reader: Reader, span: Span, name: Name) -> EmissionTime:
+    """`at each turn`."""
+    return EmissionTime(each=name)
+
+
+def repeatedly(reader: Reader, span: Span, every: Quantity) -> EmissionTime:
+    """`every 10 m`."""
+    return EmissionTime(every=every)
+
+
+def limit(reader: Reader, span: Span, quantity: Quantity) -> Quantity:
+    """`within 3 s`."""
+    return quantity
+
+
+def success(reader: Reader, span: Span, by: Name, *limits: Quantity) -> SuccessDecl:
+    """`succeeds with attitude within 2 deg within 3 s`."""
+    return SuccessDecl(span=span, by=by, limits=limits)
+
+
+def emits(
+    reader: Reader,
+    span: Span,
+    command: Name,
+    addressee: Name,
+    parameters: tuple[EmittedParameter, ...] | None,
+    time: EmissionTime,
+    success: SuccessDecl | None,
+    required: Any,
+) -> Part:
+    """`emits MAV_CMD_IMAGE_START_CAPTURE to camera with param3 = 1 every 10 m`."""
+    for each in (command, addressee):
+        reader.undotted(each, "command")
+    made = EmitsDecl(
+        span=span,
+        command=command,
+        addressee=addressee,
+        parameters=parameters or (),
+        once=time.once,
+        each=time.each,
+        every=time.every,
+        success=success,
+        required=required is not None,
+    )
+    return Part("emits", span, made)
 
 
 def parameter(
@@ -260,6 +337,7 @@ def skill(
             sizes=sizes or (),
             sized=tuple(amount for amount in amounts.values() if isinstance(amount, Sized)),
             accepts=tuple(found["accepts"]),
+            emits=tuple(found["emits"]),
         ),
         name,
     )

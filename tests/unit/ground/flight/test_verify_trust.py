@@ -237,8 +237,8 @@ def bundles() -> dict[str, bytes]:
         "mission by the policy key": bundle(first, envelope(mission, Duty.MISSION, key=case.KEYS[Duty.POLICY])),
         "mission as a policy": bundle(first, envelope(mission, Duty.MISSION, content=of_policies)),
         "policy of another version": bundle(envelope(cbor.encode(("rtshcua/policy", 6, rules)), Duty.POLICY), second),
-        "policy of another type": bundle(envelope(cbor.encode(("rtshcua/policy", 7, 1)), Duty.POLICY), second),
-        "policy is empty": bundle(envelope(cbor.encode(("rtshcua/policy", 7, ())), Duty.POLICY), second),
+        "policy of another type": bundle(envelope(cbor.encode(("rtshcua/policy", 8, 1)), Duty.POLICY), second),
+        "policy is empty": bundle(envelope(cbor.encode(("rtshcua/policy", 8, ())), Duty.POLICY), second),
     }  # fmt: skip
 
 

@@ -49,6 +49,18 @@ def command(system: int, number: int, *parameters: float) -> Message:
     return _COMMAND.build(*filled, number, system, _AUTOPILOT, 0)  # in wire order
 
 
+def payload_command(system: int, component: int, number: int, confirmation: int, *parameters: float) -> Message:
+    """COMMAND_LONG to a component of the vehicle, with all seven parameters."""
+    return _COMMAND.build(*parameters, number, system, component, confirmation)  # in wire order
+
+
+def request_of(system: int, component: int, message: str) -> Message:
+    """REQUEST_MESSAGE of a component other than the autopilot, or of it."""
+    made = copy(command(system, REQUEST_MESSAGE, number_of(message) or 0))
+    made.target_component = component
+    return made
+
+
 def set_mode(system: int, mode: Px4Mode | CopterMode) -> Message:
     """DO_SET_MODE to a custom mode."""
     return command(system, DO_SET_MODE, enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *mode.parameters)

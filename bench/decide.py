@@ -18,18 +18,21 @@ from msgspec.structs import replace
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference import flat_case as flat
+from reference import payload_case
 from rtshcua.decision.decide import PASSED, authority, decide
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare, prepare_invocation
 from rtshcua.decision.situation import environment, situation
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.code import Op
-from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.contract import Contract, EmissionMoment, MotionKind
+from rtshcua.model.flat.limits import MAX_EMISSIONS
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.zone import POLYGON, Zone
 from rtshcua.model.outcome import Outcome
 
 DECIDE_MEDIAN, DECIDE_P99, AUTHORITY_MEDIAN, MANY_RULES = 30.0, 100.0, 5.0, 2.0  # us, us, us, ratio
+PAYLOAD = 1.03  # a decision on a skill that emits commands to payload, against one on the same skill without
 ROUNDS, CALLS = 40, 250
 KEYS, WIDE = 1_000, 1_000  # skills and roles with rules in large policies; candidates in a wide policy
 ENTITIES = cedarpy.Entities.from_json_str("[]")
@@ -172,7 +175,18 @@ def sixteen(zone: Zone) -> Zone:
     return replace(zone, data=ring(*zone.data[:2], *zone.data[4:6])) if zone.shape == POLYGON else zone
 
 
-def ten_candidates() -> PreparedPolicy:
+def emitting(contracts: tuple[Contract, ...]) -> tuple[Contract, ...]:
+    """Return contracts whose inspection emits as many commands to payload as a contract may have."""
+    emits = (payload_case.emission(2_000, moment=EmissionMoment.TIME, amount=flat.S),) * MAX_EMISSIONS
+    return tuple(replace(each, emits=emits) if each.name == "inspect_area" else each for each in contracts)
+
+
+def inspection(policy: Policy) -> Invocation:
+    """Return the step that inspects, with the policy's contract."""
+    return replace(flat.INVOCATIONS[flat.INSPECTION_STEP], contract=policy.contracts[flat.INSPECT])
+
+
+def ten_candidates(*, emits: bool = False) -> PreparedPolicy:
     """Return a policy of ten rules about the inspection, in zones of 16 corners."""
     low = [flat.apply(Op.LT, flat.signal(flat.BATTERY), flat.const(n)) for n in (1_000, 1_500, 2_000)]
     narrow = [flat.apply(Op.LE, flat.argument(1), flat.const(n * flat.M)) for n in (6, 8, 10)]
@@ -184,13 +198,14 @@ def ten_candidates() -> PreparedPolicy:
         flat.RULES[6],
         flat.rule(RuleKind.FORBID, flat.INSPECT, when=flat.clause("", low[0])),
     )
-    return loaded(replace(flat.POLICY, rules=rules, zones=tuple(map(sixteen, flat.ZONES))))
+    contracts = emitting(flat.CONTRACTS) if emits else flat.CONTRACTS
+    return loaded(replace(flat.POLICY, rules=rules, zones=tuple(map(sixteen, flat.ZONES)), contracts=contracts))
 
 
-def asked_of_decide(places: int) -> Callable[[], object]:
+def asked_of_decide(places: int, *, emits: bool = False) -> Callable[[], object]:
     """Decide the inspection under ten rules about it, from one place or from several in turn."""
-    policy = ten_candidates()
-    invocation = prepared(flat.INVOCATIONS[flat.INSPECTION_STEP], policy)
+    policy = ten_candidates(emits=emits)
+    invocation = prepared(inspection(policy.policy), policy)
     assert sum(map(len, invocation.candidates)) == 10
     states = [flat.state({flat.POSITION_X: 110 * flat.M + n}) for n in range(places)]
     context = flat.context()
@@ -261,7 +276,10 @@ def main() -> int:
     decided, ten = figures["decide, admissible, 10 rules"], figures["authority, 10 candidates"][0]
     many = figures["authority, 10 of 10,000 rules"][0] / ten
     print(f"10 candidates in 10,000 rules against 10 in 10: {many:.2f} times, limit {MANY_RULES}")
+    (plain, _), (emitted, _) = measured(asked_of_decide(1), asked_of_decide(1, emits=True))
+    ratio = emitted / plain
     held = {
+        f"with {MAX_EMISSIONS} commands to payload: {ratio:.3f} times, limit {PAYLOAD}": ratio <= PAYLOAD,
         f"decide: median {decided[0]:.1f} us, limit {DECIDE_MEDIAN}": decided[0] <= DECIDE_MEDIAN,
         f"decide: p99 {decided[1]:.1f} us, limit {DECIDE_P99}": decided[1] <= DECIDE_P99,
         f"authority, 10 candidates: median {ten:.1f} us, limit {AUTHORITY_MEDIAN}": ten <= AUTHORITY_MEDIAN,

@@ -154,6 +154,10 @@ bool rt_check_policy(const rt_policy *policy, rt_prepared_policy *prepared);
 bool rt_check_zones(const rt_policy *policy, rt_prepared_policy *prepared);
 bool rt_check_place(const rt_projection *projection, int64_t x, int64_t y);
 bool rt_check_contract(const rt_contract *contract, const rt_prepared_policy *policy, uint8_t cells[RT_MAX_CELLS]);
+/* The commands to payload that a contract emits, its cells' kinds being known; the servo outputs that a vehicle declares free. */
+bool rt_check_emissions(const rt_contract *contract, const rt_vehicle *vehicle, const uint8_t cells[RT_MAX_CELLS]);
+bool rt_check_servos(const rt_vehicle *vehicle);
+bool rt_may_be_emitted(int64_t command, int64_t addressee);
 bool rt_check_chain(rt_list links, const rt_policy *policy);
 bool rt_check_link(const rt_link *link, const rt_policy *policy);
 bool rt_tightens(const rt_contract *mine, const rt_contract *policys);

@@ -3,7 +3,6 @@
 
 #define AREAS 4 /* a bit of FENCE_TYPE */
 #define GROUND_STATION 255
-#define DATUM_MOVES 2000 /* mm */
 #define ROUNDING 2       /* mm, mm/s */
 #define NEAR 449         /* 1e-7 degree of latitude */
 #define YAW_ROUNDING 100 /* 1e-6 radian */
@@ -159,7 +158,7 @@ bool rt_leads_to(const rt_frame *frame, const rt_waypoint *point, bool home_know
         return false;
     if (frame->message == RT_MSG_COMMAND_INT) {
         uint32_t yaw = rt_u32(frame, RT_COMMAND_INT_PARAM4);
-        return home_known && is_about(rt_u32(frame, RT_COMMAND_INT_Z), home_amsl + point->height, DATUM_MOVES) &&
+        return home_known && is_about(rt_u32(frame, RT_COMMAND_INT_Z), home_amsl + point->height, RT_DATUM_MOVES) &&
                (along ? rt_is_nan(yaw) : is_heading(yaw, point->heading));
     }
     uint32_t mask = rt_u16(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_TYPE_MASK);
@@ -211,7 +210,7 @@ static bool is_long(const rt_frame *frame, const rt_command *command, uint8_t au
         if (autopilot == RT_MAV_AUTOPILOT_PX4) /* it climbs at a finite place, turned to a finite heading */
             return rt_is_nan(p[4]) && rt_is_nan(p[5]) && rt_is_nan(p[6]) && (rt_is_nan(p[1]) || rt_is_zero(p[1])) &&
                    rt_is_zero(p[2]) && rt_is_zero(p[3]) && home_known &&
-                   is_about(p[7], home_amsl + command->altitude, DATUM_MOVES);
+                   is_about(p[7], home_amsl + command->altitude, RT_DATUM_MOVES);
         for (uint32_t at = 1; at <= 6; at++)
             if (!rt_is_zero(p[at]))
                 return false;

@@ -6,6 +6,7 @@
 #include "mavlink/framing.h"
 
 #define RT_NAME_OCTETS 16
+#define RT_DATUM_MOVES 2000 /* mm */
 
 typedef struct {
     int64_t latitude, longitude; /* 1e-7 degree */

@@ -4,6 +4,16 @@
 
 #include "model/flat.h"
 
+/* A command to payload that a step sends while it flies: `PayloadFrame` of onboard/ports.py. `numbers` are the bits of its parameters;
+   if `has_height`, the last is `height` (mm above home) in metres above what the autopilot expects. */
+typedef struct {
+    uint32_t numbers[7];
+    uint16_t command;
+    uint8_t addressee;
+    bool has_height;
+    int64_t height, most, interval_us;
+} rt_payload_frame;
+
 /* `path` is x0, y0, ... in local mm. If `has_place`, it is the single point `place`. Altitude mm above home, speed mm/s. `heights` and
    `headings` have one for each point, or are empty. */
 typedef struct {
@@ -13,6 +23,9 @@ typedef struct {
     bool has_place;
     int64_t place[2];
     rt_projection projection;
+    rt_payload_frame payload[RT_MAX_EMISSIONS];
+    uint32_t payload_count;
+    rt_list servos; /* the free servo outputs of the vehicle */
 } rt_command;
 
 /* A local place in 1e-7 degree: `unproject` of model/flat/zone.py. */

@@ -67,6 +67,7 @@ static bool command_of(const rt_executor *executor, const rt_permit *permit, rt_
         command->path = invocation.plan.path;
         command->heights = invocation.plan.heights;
         command->headings = invocation.plan.headings;
+        rt_payload_of(&invocation, policy, command);
         return true;
     }
     int64_t rule = -1 - permit->link, number = permit->link;

@@ -11,6 +11,7 @@ void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us
     gate->not_after_us = not_after_us;
     gate->begun = gate->let_out = false;
     gate->leg = -1;
+    rt_payload_open(&gate->payload, command, gate->system);
     rt_gate_prepared(gate);
     if (!gate->settled_known || command->kind == RT_CLIMB) {
         gate->settled_known = gate->home_known;
@@ -18,7 +19,10 @@ void rt_gate_open(rt_gate *gate, const rt_command *command, int64_t not_after_us
     }
 }
 
-void rt_gate_close(rt_gate *gate) { gate->open = false; }
+void rt_gate_close(rt_gate *gate) {
+    gate->open = false;
+    rt_payload_close(&gate->payload);
+}
 
 void rt_gate_prepare(rt_gate *gate, const rt_preparation *preparation) {
     gate->prepared_count = preparation->count;
@@ -41,8 +45,13 @@ static bool is_bytewise(const rt_gate *gate) { return gate->autopilot == RT_MAV_
 void rt_gate_observe(rt_gate *gate, rt_bytes octets, int64_t now_us) {
     rt_frame heard;
     rt_setting told;
-    if (!rt_read_frame(octets, &heard) || heard.component != RT_MAV_COMP_ID_AUTOPILOT1)
+    if (!rt_read_frame(octets, &heard))
         return;
+    if (heard.component != RT_MAV_COMP_ID_AUTOPILOT1) {
+        if (heard.message == RT_MSG_HEARTBEAT && heard.system == gate->system)
+            rt_payload_hear(&gate->payload, &heard);
+        return;
+    }
     if (heard.message == RT_MSG_HEARTBEAT) {
         uint8_t autopilot = heard.payload[RT_HEARTBEAT_AUTOPILOT], kind = heard.payload[RT_HEARTBEAT_TYPE];
         bool known = autopilot == RT_MAV_AUTOPILOT_PX4 || autopilot == RT_MAV_AUTOPILOT_ARDUPILOTMEGA;
@@ -121,13 +130,27 @@ static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t no
     return NULL;
 }
 
+static bool is_for_autopilot(const rt_frame *frame) {
+    return !frame->has_target || frame->target_component == RT_MAV_COMP_ID_AUTOPILOT1;
+}
+
+/* Whether the addressee is the autopilot, or of a command also a camera or a gimbal of the vehicle. */
+static bool is_for(const rt_gate *gate, const rt_frame *frame) {
+    const bool payload = frame->message == RT_MSG_COMMAND_LONG && rt_payload_has(&gate->payload, frame->target_component);
+    return frame->target_system == gate->system && (is_for_autopilot(frame) || payload);
+}
+
+static rt_refusal refuse_payload(rt_gate *gate, const rt_frame *frame, int64_t now_us) {
+    rt_refusal refused = rt_payload_refuse(&gate->payload, frame, now_us, gate->autopilot, gate->home_known, gate->home_amsl);
+    gate->let_out = gate->let_out || refused == NULL;
+    return refused;
+}
+
 /* Why no permit could allow a frame. */
 static rt_refusal refuse_always(const rt_gate *gate, const rt_frame *frame) {
     if (frame->system != gate->system || frame->component != RT_MAV_COMP_ID_ONBOARD_COMPUTER)
         return "frame/not-ours";
-    if (frame->has_target && frame->target_system != gate->system)
-        return "frame/wrong-target";
-    if (frame->has_target && frame->target_component != RT_MAV_COMP_ID_AUTOPILOT1 && !rt_asks_camera(frame))
+    if (frame->has_target && !is_for(gate, frame) && (frame->target_system != gate->system || !rt_asks_camera(frame)))
         return "frame/wrong-target";
     return rt_is_forced_arming(frame) ? "frame/forced-arming" : NULL;
 }
@@ -150,6 +173,12 @@ static rt_refusal refuse(rt_gate *gate, rt_bytes octets, int64_t now_us, bool *c
         return NULL;
     if (gate->chain->over)
         return "frame/session-over";
+    if (rt_is_payload(&frame)) {
+        *carries = true;
+        return refuse_payload(gate, &frame, now_us);
+    }
+    if (!is_for_autopilot(&frame))
+        return "frame/wrong-target";
     bool sets = frame.message == RT_MSG_PARAM_SET && rt_setting_of(&frame, is_bytewise(gate), &setting);
     if (sets && is_prepared(gate, &setting, now_us))
         return rt_gate_stands(gate, now_us) ? NULL : "frame/not-down";
@@ -189,6 +218,8 @@ static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, r
     rt_refusal refused = refuse_always(gate, &frame);
     if (refused != NULL)
         return refused;
+    if (!is_for_autopilot(&frame))
+        return "frame/wrong-target";
     if (!rt_carries_out(&frame, command, gate->autopilot, gate->home_known, gate->home_amsl))
         return "frame/not-covered";
     if (!rt_point_of(&frame, &point))

@@ -4,6 +4,7 @@
 
 #include "allow_list.h"
 #include "mavlink/signing.h"
+#include "payload_gate.h"
 #include "wire/boundary_chain.h"
 #include "wire/preparation.h"
 
@@ -19,6 +20,7 @@ typedef struct {
     bool here_known;
     rt_point here;
     int64_t above_home; /* mm */
+    rt_payload_gate payload;
     bool let_out; /* a frame was sent or signed ahead since the last permit */
     bool started; /* a session was opened: fences are no longer changed */
     uint8_t system, autopilot, kind; /* of its heartbeat */

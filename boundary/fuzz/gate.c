@@ -4,7 +4,8 @@
 
 #include "wire/octets.h"
 
-#define PATH 12 /* encodings of the coordinates of a path */
+#define PATH 12     /* encodings of the coordinates of a path */
+#define EMISSION 36 /* octets of a command to payload */
 
 static rt_gate gate;
 static rt_chain chain;
@@ -30,6 +31,16 @@ static void permit(rt_bytes record, int64_t now_us) {
     if ((record.at[0] & 32) != 0) { /* coordinates are heights and headings too: the checks ensure their bounds, the gate needs none */
         command.heights = command.headings = command.path;
         command.heights.count = command.headings.count = command.path.count / 2;
+    }
+    for (at += PATH; record.at + record.size - at >= EMISSION && command.payload_count < RT_MAX_EMISSIONS; command.payload_count++) {
+        rt_payload_frame *frame = &command.payload[command.payload_count];
+        for (int number = 0; number < 7; number++) frame->numbers[number] = (uint32_t)rt_take(&at, 4);
+        frame->command = (uint16_t)rt_take(&at, 2);
+        frame->addressee = *at % 3;
+        frame->has_height = (*at & 4) != 0;
+        frame->most = *at++ >> 4;
+        frame->interval_us = *at++ << 16;
+        frame->height = bounded(&at, RT_LOWEST, RT_HIGHEST);
     }
     rt_gate_open(&gate, &command, now_us + 1000000);
 }

@@ -80,6 +80,38 @@ static uint32_t nearest(int64_t value) {
     return sign | exponent << 23 | ((uint32_t)mantissa & FRACTION);
 }
 
+uint32_t rt_nearest_bits(int64_t numerator, int64_t denominator) {
+    const uint64_t size = (uint64_t)rt_abs(numerator), by = (uint64_t)denominator;
+    uint64_t mantissa = size / by, rest = size % by;
+    uint32_t exponent = 150, cut = 0;
+    if (size == 0)
+        return 0;
+    for (; mantissa < 1ULL << 23; exponent--) {
+        rest *= 2;
+        mantissa = 2 * mantissa + (rest >= by);
+        rest -= rest >= by ? by : 0;
+    }
+    while (cut < 30 && mantissa >> cut >= 1ULL << 24)
+        cut++;
+    bool above, half; /* whether what is cut off is more than half of the last place, or exactly half */
+    if (cut == 0) {
+        above = 2 * rest > by;
+        half = 2 * rest == by;
+    } else {
+        uint64_t low = mantissa & ((1ULL << cut) - 1), middle = 1ULL << (cut - 1);
+        above = low > middle || (low == middle && rest > 0);
+        half = low == middle && rest == 0;
+    }
+    mantissa >>= cut;
+    exponent += cut;
+    mantissa += above || (half && (mantissa & 1) != 0);
+    if (mantissa == 1ULL << 24) {
+        mantissa >>= 1;
+        exponent++;
+    }
+    return (numerator < 0 ? 0x80000000U : 0) | exponent << 23 | ((uint32_t)mantissa & FRACTION);
+}
+
 /* A number with the same order as finite floats; -0 is 0. */
 static int64_t order_of(uint32_t bits) { return with_sign(bits, bits & 0x7FFFFFFFU); }
 

@@ -4,6 +4,9 @@
 
 #include "../base.h"
 
+#define RT_NAN 0x7FC00000U /* as everybody writes it */
+/* The bits of the float nearest to a fraction, ties to even: the numerator is within 2**53, the denominator from 1 to 2**30. */
+uint32_t rt_nearest_bits(int64_t numerator, int64_t denominator);
 bool rt_is_finite(uint32_t bits);
 bool rt_is_nan(uint32_t bits);
 bool rt_is_zero(uint32_t bits);             /* -0 too */

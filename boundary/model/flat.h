@@ -74,6 +74,22 @@ typedef struct {
     int64_t kind, altitude, speed, time, lowest, facing;
 } rt_motion;
 
+/* Commands to payload. The addressee of RT_AUTOPILOT is `VEHICLE` in Python. */
+enum { RT_AUTOPILOT = 0, RT_CAMERA = 1, RT_GIMBAL = 2 };
+enum { RT_AT_BEGIN = 0, RT_AT_END = 1, RT_AT_TURN = 2, RT_AT_WAYPOINT = 3, RT_BY_DISTANCE = 4, RT_BY_TIME = 5 };
+enum { RT_BY_ACKNOWLEDGEMENT = 0, RT_BY_IMAGE = 1, RT_BY_ATTITUDE = 2 };
+enum { RT_CONSTANT = 0, RT_OF_ARGUMENT = 1, RT_LATITUDE = 2, RT_LONGITUDE = 3, RT_HEIGHT = 4 };
+
+typedef struct {
+    int64_t origin, cell, value;
+} rt_emission_parameter;
+
+typedef struct {
+    int64_t command, addressee;
+    rt_list parameters; /* rt_emission_parameter */
+    int64_t moment, amount, success, bound, within_us, required;
+} rt_emission;
+
 typedef struct {
     rt_bytes name;
     rt_list parameters; /* rt_parameter */
@@ -86,6 +102,7 @@ typedef struct {
     int64_t energy;
     rt_list record; /* texts */
     rt_list reads; /* integers */
+    rt_list emits; /* rt_emission */
 } rt_contract;
 
 /* signal.py */
@@ -149,6 +166,7 @@ typedef struct {
     rt_speeds speeds;
     rt_bytes time_zone, time_zone_data;
     rt_list offsets; /* integers */
+    rt_list servos;  /* likewise */
 } rt_vehicle;
 
 /* The fields of a left-out clause that `decision/checks` reads. */
@@ -247,6 +265,8 @@ bool rt_next_link(rt_list *list, rt_link *link);
 bool rt_next_parameter(rt_list *list, rt_parameter *parameter);
 bool rt_next_source(rt_list *list, rt_signal_source *source);
 bool rt_next_left_out(rt_list *list, rt_left_out *left_out);
+bool rt_next_emission(rt_list *list, rt_emission *emission);
+bool rt_next_emission_parameter(rt_list *list, rt_emission_parameter *parameter);
 
 /* The integer at an index, by a walk through the list, for short lists. -1 is never returned: the index is below `count`. */
 int64_t rt_int_at(rt_list list, uint32_t index);

@@ -20,8 +20,10 @@ int main(void) {
     rt_parameter parameter;
     rt_signal_source source;
     rt_left_out left_out;
+    rt_emission emission;
+    rt_emission_parameter emission_parameter;
     int64_t number;
-    switch (Frama_C_interval(0, 10)) {
+    switch (Frama_C_interval(0, 12)) {
     case 0: return rt_read_policy(data, &policy) != NULL;
     case 1: return rt_read_mission(data, &mission) != NULL;
     case 2: return rt_next_int(&items, &number);
@@ -31,7 +33,9 @@ int main(void) {
     case 6: return rt_next_parameter(&items, &parameter);
     case 7: return rt_next_source(&items, &source);
     case 8: return rt_next_left_out(&items, &left_out);
-    case 9: rt_read_invocation(data, &invocation); return 0;
+    case 9: return rt_next_emission(&items, &emission);
+    case 10: return rt_next_emission_parameter(&items, &emission_parameter);
+    case 11: rt_read_invocation(data, &invocation); return 0;
     default: return rt_holds(items, rt_int_at(items, SIZE(UINT32_MAX)));
     }
 }

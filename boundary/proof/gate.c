@@ -6,6 +6,8 @@ static uint8_t octets[RT_LARGEST_FRAME + 1], out[RT_LARGEST_FRAME], path[16];
 static rt_gate gate;
 static rt_chain chain;
 static rt_preparation preparation;
+static rt_invocation invocation;
+static rt_policy policy;
 
 /* The checks ensure these bounds for every coordinate of a path (decision/checks). */
 bool rt_next_int(rt_list *list, int64_t *value) {
@@ -15,9 +17,37 @@ bool rt_next_int(rt_list *list, int64_t *value) {
     return true;
 }
 
+/* The checks ensure these bounds for the numbers of a command to payload and its arguments. */
+bool rt_next_emission(rt_list *list, rt_emission *emission) {
+    if (list->count == 0) return false;
+    list->count--;
+    ANY(*emission);
+    emission->amount = WITHIN(0, RT_MAX_DURATION);
+    if (emission->moment == RT_BY_DISTANCE) emission->amount = WITHIN(1, RT_MAX_COORDINATE);
+    emission->parameters.count = 7;
+    return true;
+}
+
+bool rt_next_emission_parameter(rt_list *list, rt_emission_parameter *parameter) {
+    if (list->count == 0) return false;
+    list->count--;
+    parameter->origin = WITHIN(RT_CONSTANT, RT_HEIGHT);
+    parameter->cell = WITHIN(-1, RT_MAX_CELLS - 2);
+    parameter->value = parameter->origin == RT_OF_ARGUMENT ? WITHIN(1, RT_MAX_DIVISOR) : WITHIN(RT_LOWEST, UINT32_MAX);
+    return true;
+}
+
+int64_t rt_int_at(rt_list list, uint32_t index) { return WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE); }
+
 void rt_chain_stop(rt_chain *of, rt_bytes frame) { read_all(frame); }
 void rt_chain_sign_ahead(rt_chain *of, rt_bytes frame) { read_all(frame); }
 void rt_chain_leave(rt_chain *of, rt_bytes frame) { read_all(frame); }
+
+static void bound(rt_payload_frame *frame) {
+    frame->has_height = EITHER();
+    frame->height = WITHIN(RT_LOWEST, RT_HIGHEST);
+    frame->interval_us = WITHIN(0, RT_MAX_DURATION);
+}
 
 static void begin(rt_command *command) {
     const int64_t factor = 32LL << RT_SHIFT;
@@ -32,7 +62,17 @@ static void begin(rt_command *command) {
     command->place[0] = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
     command->place[1] = WITHIN(-RT_MAX_COORDINATE, RT_MAX_COORDINATE);
     command->projection = (rt_projection){WITHIN(-900000000, 900000000), WITHIN(-RT_HALF_TURN, RT_HALF_TURN), WITHIN(1, factor), WITHIN(1, factor)};
+    command->payload_count = SIZE(RT_MAX_EMISSIONS);
+    for (uint32_t at = 0; at < RT_MAX_EMISSIONS; at++) bound(&command->payload[at]);
+    command->servos = (rt_list){path, path + sizeof path, SIZE(RT_MAX_SERVOS)};
     ANY(gate);
+    gate.payload.servos = command->servos;
+    gate.payload.count = SIZE(1 + RT_MAX_EMISSIONS);
+    for (uint32_t at = 0; at <= RT_MAX_EMISSIONS; at++) {
+        bound(&gate.payload.open[at].frame);
+        gate.payload.open[at].sent = WITHIN(0, RT_MAX_VALUE);
+        gate.payload.open[at].last_us = WITHIN(0, RT_MAX_VALUE);
+    }
     gate.chain = &chain;
     gate.command = *command;
     gate.signs = EITHER(), gate.open = EITHER(), gate.begun = EITHER(), gate.here_known = EITHER(), gate.started = EITHER();
@@ -68,7 +108,14 @@ int main(void) {
     rt_bytes frame = {octets, SIZE(RT_LARGEST_FRAME)};
     begin(&command);
     begin_link(&gate.signer, now_us);
-    switch (Frama_C_interval(0, 5)) {
+    switch (Frama_C_interval(0, 6)) {
+    case 6:
+        invocation.contract.emits.count = SIZE(RT_MAX_EMISSIONS);
+        policy.vehicle.speed = WITHIN(1, RT_MAX_SPEED);
+        policy.projection = command.projection;
+        command.payload_count = 0;
+        rt_payload_of(&invocation, &policy, &command);
+        break;
     case 0: rt_gate_observe(&gate, frame, now_us); break;
     case 1: rt_gate_seal(&gate, frame, now_us, out, &size); break;
     case 2: return rt_accept_frame(&gate.signer, frame, later_us);

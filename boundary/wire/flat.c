@@ -56,6 +56,20 @@ static bool parameter(rt_cursor *cursor, rt_parameter *into) {
            INT(into->high) && rt_take_texts(cursor, &into->labels);
 }
 
+static bool emission_parameter(rt_cursor *cursor, rt_emission_parameter *into) {
+    return STRUCT(3) && INT(into->origin) && INT(into->cell) && INT(into->value);
+}
+
+static LIST(emission_parameters, rt_emission_parameter, emission_parameter)
+
+static bool emission(rt_cursor *cursor, rt_emission *into) {
+    rt_bytes text;
+    return STRUCT(10) && INT(into->command) && INT(into->addressee) && emission_parameters(cursor, &into->parameters) &&
+           INT(into->moment) && INT(into->amount) && INT(into->success) && INT(into->bound) && INT(into->within_us) &&
+           INT(into->required) && TEXT(text);
+}
+
+static LIST(emissions, rt_emission, emission)
 static LIST(clauses, rt_clause, clause)
 static LIST(links, rt_link, link)
 static LIST(parameters, rt_parameter, parameter)
@@ -84,11 +98,15 @@ static bool plan(rt_cursor *cursor, rt_plan *into) {
 }
 
 static bool contract(rt_cursor *cursor, rt_contract *into) {
-    return STRUCT(16) && TEXT(into->name) && parameters(cursor, &into->parameters) && motion(cursor, &into->motion) &&
-           INT(into->timing_class) && INT(into->deadline_us) && INT(into->validity_us) && rt_take_texts(cursor, &into->phases) && INT(into->duration_us) &&
-           INT(into->grace_us) && clauses(cursor, &into->require) && clauses(cursor, &into->assume) &&
-           clauses(cursor, &into->maintain) && links(cursor, &into->fallback) && INT(into->energy) &&
-           rt_take_texts(cursor, &into->record) && rt_take_ints(cursor, &into->reads);
+    uint32_t fields;
+    if (!rt_take_extended(cursor, 16, 17, &fields) || !TEXT(into->name) || !parameters(cursor, &into->parameters) ||
+        !motion(cursor, &into->motion) || !INT(into->timing_class) || !INT(into->deadline_us) || !INT(into->validity_us) ||
+        !rt_take_texts(cursor, &into->phases) || !INT(into->duration_us) || !INT(into->grace_us) || !clauses(cursor, &into->require) ||
+        !clauses(cursor, &into->assume) || !clauses(cursor, &into->maintain) || !links(cursor, &into->fallback) ||
+        !INT(into->energy) || !rt_take_texts(cursor, &into->record) || !rt_take_ints(cursor, &into->reads))
+        return false;
+    into->emits = (rt_list){cursor->at, cursor->at, 0};
+    return fields == 16 || (emissions(cursor, &into->emits) && into->emits.count > 0);
 }
 
 typedef struct {
@@ -154,14 +172,16 @@ static bool speeds(rt_cursor *cursor, rt_speeds *into) {
 }
 
 static bool vehicle(rt_cursor *cursor, rt_vehicle *into) {
-    if (!STRUCT(23) || !TEXT(into->name) || !TEXT(into->identity) || !INT(into->home_within) || !INT(into->speed) || !INT(into->climb) ||
+    uint32_t fields;
+    if (!rt_take_extended(cursor, 23, 24, &fields) || !TEXT(into->name) || !TEXT(into->identity) || !INT(into->home_within) || !INT(into->speed) || !INT(into->climb) ||
         !INT(into->position_error) || !INT(into->endurance_us) || !INT(into->reserve) || !INT(into->utc_offset_us) ||
         !INT(into->position) || !INT(into->height) || !INT(into->battery) || !INT(into->return_altitude) || !INT(into->braking) ||
         !INT(into->reaction_us) || !INT(into->north) || !INT(into->east) || !INT(into->down) || !rt_take_texts(cursor, &into->without))
         return false;
+    into->servos = (rt_list){cursor->at, cursor->at, 0};
     into->has_speeds = !rt_take_null(cursor);
     return (!into->has_speeds || speeds(cursor, &into->speeds)) && TEXT(into->time_zone) && TEXT(into->time_zone_data) &&
-           rt_take_ints(cursor, &into->offsets);
+           rt_take_ints(cursor, &into->offsets) && (fields == 23 || (rt_take_ints(cursor, &into->servos) && into->servos.count > 0));
 }
 
 TABLE(roles, rt_bytes, RT_MAX_ROLES, rt_take_text)
@@ -284,6 +304,8 @@ NEXT(rt_next_link, rt_link, link)
 NEXT(rt_next_parameter, rt_parameter, parameter)
 NEXT(rt_next_source, rt_signal_source, signal_source)
 NEXT(rt_next_left_out, rt_left_out, omission)
+NEXT(rt_next_emission, rt_emission, emission)
+NEXT(rt_next_emission_parameter, rt_emission_parameter, emission_parameter)
 
 static bool text_or_octets(rt_cursor *cursor, rt_bytes *into) {
     rt_cursor again = *cursor;

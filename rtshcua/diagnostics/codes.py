@@ -114,6 +114,10 @@ UNKNOWN_COMMAND = _code("E0416", "unknown-command", "unknown MAVLink command")
 UNKNOWN_MODE = _code("E0417", "unknown-mode", "unknown autopilot, or a flight mode that it does not have")
 ACCEPTED_TWICE = _code("E0418", "accepted-twice", "a MAVLink command, message or mode stands for two skills")
 OTHER_MOTION = _code("E0419", "other-motion", "a skill accepts what means another motion", Severity.WARNING)
+NEVER_EMITTED = _code("E0430", "never-emitted", "a skill emits a command that no skill may emit")
+EMISSION_FORM = _code("E0431", "emission-form", "the addressee, the time or the success of a command does not fit it")
+EMITTED_NUMBER = _code("E0432", "emitted-number", "a number cannot be sent precisely as a parameter of a command")
+SERVO_NOT_FREE = _code("E0433", "servo-not-free", "a skill sets a servo output that the vehicle does not declare free")
 
 # E05: zones and geometry
 BAD_POLYGON = _code("E0501", "bad-polygon", "the corners do not form a simple polygon")

@@ -67,6 +67,32 @@ def value_of(bits: int) -> float:
     return float(unpack("<f", pack("<I", bits))[0])
 
 
+#: the bits of the float that is not a number, as everybody writes it
+NAN: Final = 0x7FC00000
+
+
+def nearest_bits(numerator: int, denominator: int) -> int:
+    """The bits of the 32-bit float nearest to a fraction, ties to even: exactly, without computing with floats.
+
+    The magnitude of the numerator is at most 2**53, the denominator from 1 to 2**30.
+    """
+    mantissa, rest = divmod(abs(numerator), denominator)
+    if not mantissa and not rest:
+        return 0
+    exponent = 150
+    while mantissa < 1 << 23:
+        mantissa, rest = 2 * mantissa + (2 * rest >= denominator), 2 * rest % denominator
+        exponent -= 1
+    cut = max(mantissa.bit_length() - 24, 0)
+    half, low = denominator << cut, 2 * ((mantissa & (1 << cut) - 1) * denominator + rest)
+    mantissa >>= cut
+    mantissa += low > half or (low == half and mantissa & 1)
+    exponent += cut
+    if mantissa == 1 << 24:
+        mantissa, exponent = mantissa >> 1, exponent + 1
+    return (numerator < 0) << 31 | exponent << 23 | mantissa & 0x7FFFFF
+
+
 def shown(bits: int) -> str:
     """The value of 32 bits as a float in the fewest digits that identify it: 0.1, and not 0.100000001."""
     value = value_of(bits)

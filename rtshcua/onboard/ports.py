@@ -108,6 +108,14 @@ class Hindered(Event, frozen=True):
     text: str
 
 
+class PayloadOutcome(Event, frozen=True):
+    """A command to payload of command `token` was sent, had its effect (`done`), or did not (`failed`), as text."""
+
+    token: int
+    what: str
+    text: str
+
+
 #: how a takeover was detected: the vehicle stands still far from its target, and nothing else shows who flies it
 PAUSED: Final = "paused"
 
@@ -242,6 +250,29 @@ class Noted(Event, frozen=True):
 ALWAYS: Final = (1 << 63) - 1
 
 
+class PayloadFrame(Frozen, frozen=True):
+    """A command to payload that a step sends while it flies (`model.flat.contract.Emission`), with its numbers.
+
+    `numbers` are the bits of its seven parameters. If `height` is not None, the seventh is that height (mm above
+    home) in metres above what the autopilot expects. It is sent at most `most` times, or if it has an interval as
+    often as that allows; each time it may be repeated while nobody acknowledges it. `amount` is the distance in mm or
+    the time in us between two.
+    """
+
+    command: int
+    addressee: int
+    numbers: tuple[int, ...]
+    height: int | None
+    moment: int
+    amount: int
+    most: int
+    interval_us: int
+    success: int
+    bound: int
+    within_us: int
+    required: bool
+
+
 class Command(Frozen, frozen=True):
     """One bounded manoeuvre for the vehicle adapter to send; the executor checked its permit in the same step.
 
@@ -254,6 +285,8 @@ class Command(Frozen, frozen=True):
     `needs_record`: it is held until every earlier `Append` is stored, and not sent if one cannot be stored
     (`withheld`), or if another command replaces it. A fallback is sent at once in any case. The sender checks the
     clock again: after `not_after_us` the command is not sent, and `CommandFailed` with reason `late` reports it.
+
+    `payload` is what a step sends to cameras, gimbals and the like meanwhile; `servos` are the vehicle's free outputs.
     """
 
     token: int
@@ -268,6 +301,8 @@ class Command(Frozen, frozen=True):
     heights: tuple[int, ...] = ()
     headings: tuple[int, ...] = ()
     not_after_us: int = ALWAYS
+    payload: tuple[PayloadFrame, ...] = ()
+    servos: tuple[int, ...] = ()
 
     def height_at(self, number: int) -> int:
         """The height of a point of the path, mm above home."""

@@ -19,7 +19,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 SAMPLES: dict[str, dict[str, Any]] = {
     "analysis": {"SIZES": (20, 40), "ROUNDS": 1},
     "archive": {"VEHICLES": 2, "FLIGHTS": 3, "EACH": 20, "MISSING": (0, 1), "CHANGED": (1, 1)},
-    "boundary": {"ROUNDS": 1, "BATCHES": 1, "CALLS": 2},
+    "boundary": {"ROUNDS": 1, "BATCHES": 1, "CALLS": 2, "TURNS": 1},
     "boundary_process": {"BLOCKS": 1, "ROUNDS": 2, "STARTS": 1},
     "compile": {"SIZES": (200, 400), "ROUNDS": 1},
     "day": {"HOURS": 1, "FLIGHTS": 1, "TEN": 1},

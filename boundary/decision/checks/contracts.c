@@ -100,7 +100,7 @@ bool rt_check_contract(const rt_contract *contract, const rt_prepared_policy *po
     if (!rt_within(contract->energy, 0, RT_FULL)) return false;
     /* only a reflex may lose its record with the process, because it has no time to wait */
     if (recorded_as(contract->record, &named) == 0 && contract->timing_class != RT_REFLEX) return false;
-    if (named > 1) return false;
+    if (named > 1 || !rt_check_emissions(contract, &policy->policy->vehicle, cells)) return false;
     const rt_scope scope = {policy, {NULL, NULL, 0}, cells, policy->policy->monitor_count, true};
     return check_clauses(contract->require, &scope, &reads) && check_clauses(contract->assume, &scope, &reads) &&
            check_clauses(contract->maintain, &scope, &reads) && same_reads(contract->reads, &reads);
@@ -251,8 +251,9 @@ bool rt_tightens(const rt_contract *mine, const rt_contract *policys) {
     const rt_motion *a = &mine->motion, *b = &policys->motion;
     int named;
     return rt_same(mine->name, policys->name) && a->kind == b->kind && a->altitude == b->altitude && a->speed == b->speed &&
-           a->time == b->time && a->lowest == b->lowest && a->facing == b->facing && mine->timing_class == policys->timing_class && same_calls(mine->fallback, policys->fallback) &&
-           same_parameters(mine->parameters, policys->parameters) &&
+           a->time == b->time && a->lowest == b->lowest && a->facing == b->facing && mine->timing_class == policys->timing_class &&
+           same_calls(mine->fallback, policys->fallback) && same_parameters(mine->parameters, policys->parameters) &&
+           rt_same_list(mine->emits, policys->emits) &&
            (policys->phases.count == 0 || (mine->phases.count > 0 && subset(mine->phases, policys->phases))) &&
            mine->deadline_us <= policys->deadline_us && mine->validity_us <= policys->validity_us &&
            (policys->duration_us == 0 || rt_within(mine->duration_us, 1, policys->duration_us)) &&

@@ -72,7 +72,7 @@ static bool check_numbers(const rt_vehicle *v) {
            rt_within(v->climb, 1, RT_MAX_SPEED) && rt_within(v->position_error, 0, RT_MAX_POSITION_ERROR) &&
            rt_within(v->endurance_us, 1, RT_MAX_DURATION) && rt_within(v->reserve, 0, RT_FULL) &&
            rt_within(v->return_altitude, 0, RT_HIGHEST) && rt_within(v->utc_offset_us, -RT_DAY, RT_DAY) &&
-           rt_within(v->braking, 0, RT_MAX_SPEED) && rt_within(v->reaction_us, 0, RT_MAX_REACTION) && check_offsets(v) &&
+           rt_within(v->braking, 0, RT_MAX_SPEED) && rt_within(v->reaction_us, 0, RT_MAX_REACTION) && check_offsets(v) && rt_check_servos(v) &&
            !(v->braking && (v->north == -1 || v->east == -1 || v->down == -1)) && (!v->has_speeds || check_speeds(&v->speeds));
 }
 

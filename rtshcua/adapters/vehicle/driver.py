@@ -28,6 +28,8 @@ from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendi
 from rtshcua.adapters.vehicle.messages import Announcer, Message, StatusTexts
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
+from rtshcua.adapters.vehicle.payload_sender import HEEDED as OF_PAYLOAD
+from rtshcua.adapters.vehicle.payload_sender import PayloadSender
 from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.restart import arrives, flown_by, modes_of
@@ -170,6 +172,8 @@ class Driver:
         self._who_us: int | None = None
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
+        self._payload = PayloadSender(self._send_payload)
+        self._sent: list[bytes] = []  # what the payload was sent, to return with other frames
         self._left_mode: int | None = None  # one report shows a mode change away from this mode that is not ours
         self._others: str | None = None  # how a takeover showed; nothing of ours begins after it
         self._unsent: int | None = None  # the token of a command of which no frame has left yet
@@ -298,7 +302,7 @@ class Driver:
                 self._receive_frame(frame, now_us, events, send)
         if self.flavour is None:
             return DatagramContents(events, self._ask_who(received, now_us) if self.hurries else [], received)
-        return DatagramContents(events, self._pack(send, now_us, events) if send else [], received)
+        return DatagramContents(events, self._packed(send, now_us, events), received)
 
     def _receive_frame(self, frame: ReceivedFrame, now_us: int, events: list[Event], send: list[Message]) -> None:
         watch = self._watch
@@ -308,9 +312,38 @@ class Driver:
             if watch.heard_us != now_us or watch.down or self._was_mute:  # once for all frames of one moment
                 watch.heard_us = now_us
                 self._look(now_us, events)
+        if frame.name in OF_PAYLOAD and self._payload_hears(frame):
+            self._payload.take(frame.name, frame.message, frame.component, now_us)
         new, manoeuvre = self._take(frame, now_us, events, send), self._manoeuvre
         if new or (manoeuvre is not None and now_us >= manoeuvre.due_us):
             self._advance(now_us, send, events)
+        self._serve_payload(now_us, events)
+
+    def _payload_hears(self, frame: ReceivedFrame) -> bool:
+        """Whether a message that may tell about payload does: of another component, or for us."""
+        if frame.name == "HEARTBEAT":
+            return frame.component != AUTOPILOT
+        return frame.name != "COMMAND_ACK" or (self._payload.busy and self._is_for_us(frame.message))
+
+    def _serve_payload(self, now_us: int, events: list[Event]) -> None:
+        """Send the payload what is due while the link is up, and take in what became of it."""
+        sender, of = self._payload, self._manoeuvre
+        if not sender.busy or self._watch.down == SILENT:
+            return
+        assert self.flavour is not None
+        sender.datum = (self.seen.home_amsl or 0) if self.flavour is PX4 else 0
+        flies = of is not None and (self._unsent != of.token or not of.awaits_frame)
+        asked = sender.asked
+        for event in sender.advance(self.seen, now_us, flies=flies):
+            if isinstance(event, ports.CommandFailed) and of is not None:
+                of.over = True
+            events.append(event)
+        self._aids.query.asked += sender.asked - asked
+
+    def _send_payload(self, message: Message, now_us: int) -> Refusal | None:
+        frames, refused = self.link.pack([message], now_us)
+        self._sent += frames
+        return refused[0] if refused else None
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
         """Do what is due at a time: heartbeat, stream requests, retries, link loss."""
@@ -337,12 +370,16 @@ class Driver:
             events += self.images.expected_images(now_us)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
-        frames = self._pack(send, now_us, events) if send else []
+        self._serve_payload(now_us, events)
+        frames = self._packed(send, now_us, events)
         if self._gate_may_be_lost:
-            if self._flies_without_frame:
-                self._renew_ahead(now_us, events, begins=True)
-            self._renew_ahead(now_us, events, begins=False)
+            self._renew_all_ahead(now_us, events)
         return events, frames + self._set_parameters(now_us) if self.settings.outstanding else frames
+
+    def _renew_all_ahead(self, now_us: int, events: list[Event]) -> None:
+        if self._flies_without_frame:
+            self._renew_ahead(now_us, events, begins=True)
+        self._renew_ahead(now_us, events, begins=False)
 
     def _judge_readiness(self, now_us: int, events: list[Event]) -> None:
         if self._is_ready(now_us):
@@ -425,6 +462,8 @@ class Driver:
             slug = "no-datum" if isinstance(error, NoDatum) else "broken-manoeuvre"
             return [ports.CommandFailed(now_us, command.token, slug, str(error))], []
         self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before, doubted)
+        self._payload.system = self.system
+        self._payload.begin(command)
         self._left_mode = None  # the new manoeuvre keeps it as a suspicion
         self.consumption.fly(command.speed)
         self._unsent = command.token
@@ -467,6 +506,7 @@ class Driver:
     def release(self) -> None:
         """Stand down: send nothing more that moves the vehicle."""
         self._manoeuvre, self._unsent, self._released = None, None, True
+        self._payload.close()
 
     def _ask_who(self, received: Sequence[ReceivedFrame], now_us: int) -> list[bytes]:
         if self._who_us is not None and now_us - self._who_us < WHO_US:
@@ -747,7 +787,8 @@ class Driver:
                 self._others = event.how
                 self._tell_crossed(event.how, now_us, events)
                 event = replace(event, failsafe=self.seen.critical)
-            events.append(event)
+            if not (isinstance(event, ports.Succeeded) and self._payload.ends(event)):
+                events.append(event)
         self._doubt(now_us, send)
         if manoeuvre.waits:
             send += self._ask(now_us)
@@ -846,6 +887,10 @@ class Driver:
             return False
         return self.seen.mode in self.flavour.aims and now_us - self._answers_us <= PATIENCE_REFUSED_US
 
+    def _packed(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
+        """The frames to send, with those to payload."""
+        return self._pack(send, now_us, events) if send or self._sent else []
+
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
         """The frames that the boundary permits. A manoeuvre whose frame it refuses has failed."""
         of = self._manoeuvre
@@ -853,6 +898,7 @@ class Driver:
         if begins and of is not None and now_us <= of.command.not_after_us:
             self._renew_ahead(now_us, events, begins=True)  # the frames that bring it down are there before it sets off
         frames, refused = self.link.pack(send, now_us)
+        to_payload, self._sent = self._sent, []
         moving, self._moving = self._moving, False
         if moving and frames:
             self._steered_us = now_us
@@ -861,4 +907,4 @@ class Driver:
         elif moving and self._unsent is not None:
             events.append(ports.Sent(now_us, self._unsent))
             self._unsent = None
-        return frames
+        return to_payload + frames  # in the order of their signatures

@@ -51,6 +51,11 @@ def command(system: int, number: int, *parameters: float) -> Message:
     return _COMMAND.build(*filled, number, system, _AUTOPILOT, 0)  # in wire order
 
 
+def payload_command(system: int, component: int, number: int, confirmation: int, *parameters: float) -> Message:
+    """COMMAND_LONG to a component of the vehicle, with all seven parameters."""
+    return _COMMAND.build(*parameters, number, system, component, confirmation)  # in wire order
+
+
 def set_mode(system: int, mode: Px4Mode | CopterMode) -> Message:
     """DO_SET_MODE to a custom mode."""
     return command(system, DO_SET_MODE, enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, *mode.parameters)

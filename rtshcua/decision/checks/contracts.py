@@ -5,6 +5,7 @@ or be stricter (design 5).
 from collections import Counter
 from collections.abc import Iterator
 
+from rtshcua.decision.checks.emission_numbers import emission
 from rtshcua.decision.checks.indexes import at, index, within
 from rtshcua.decision.checks.zones import place
 from rtshcua.decision.contracts import cells, first_cell, misfit
@@ -50,6 +51,9 @@ def contract(contract: Contract, policy: Policy, scope: CodeScope) -> Iterator[s
         yield from within(name, duration, 0, limits.MAX_DURATION)
     yield from within("energy", contract.energy, 0, limits.FULL)
     yield from _record(contract)
+    yield from within("number of commands to payload", len(contract.emits), 0, limits.MAX_EMISSIONS)
+    for number, emitted in enumerate(contract.emits):
+        yield from at(f"emits {number}", emission(emitted, contract, policy.vehicle))
     about = scope.about(contract)
     for name, clauses in (
         ("require", contract.require),
@@ -162,6 +166,7 @@ def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
         ("motion", mine.motion == policys.motion),
         ("timing class", mine.timing_class == policys.timing_class),
         ("fallback", _calls(mine.fallback) == _calls(policys.fallback)),
+        ("emits", mine.emits == policys.emits),
         ("parameters", _same_parameters(mine, policys)),
         ("phases", not policys.phases or (bool(mine.phases) and set(mine.phases) <= set(policys.phases))),
         ("deadline", mine.deadline_us <= policys.deadline_us),

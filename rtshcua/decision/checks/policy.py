@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from rtshcua.decision.checks.contracts import chain, clause, contract, link
+from rtshcua.decision.checks.emission_numbers import servos
 from rtshcua.decision.checks.indexes import ascending, at, index, within
 from rtshcua.decision.checks.zones import zones
 from rtshcua.decision.tree import CodeScope, scope_of
@@ -101,6 +102,7 @@ def _numbers(vehicle: VehicleLimits) -> Iterator[str]:
     yield from within("braking", vehicle.braking, 0, limits.MAX_SPEED)
     yield from within("reaction", vehicle.reaction_us, 0, MAX_REACTION)
     yield from _offsets(vehicle)
+    yield from servos(vehicle)
     if vehicle.braking and -1 in (vehicle.north, vehicle.east, vehicle.down):
         yield "braking is declared without a velocity signal"
     if vehicle.speeds is not None:

@@ -11,11 +11,13 @@ compare with the dialect. A message that is not known to be harmless counts as a
 | home | mode Return | mode RTL |
 | land | mode Land | mode LAND |
 
-Heights above sea are checked with the height of home that the vehicle reported.
+Heights above sea are checked with the height of home that the vehicle reported. A step may also send the commands to
+payload that its contract lists, with these parameters, and later what ends pictures, a video, or control of a gimbal.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum, auto
+from fractions import Fraction
 from math import isfinite, isnan, nan
 from typing import Any, Final, NamedTuple
 
@@ -30,8 +32,8 @@ from rtshcua.mavlink.layouts import (
     SET_POSITION_TARGET_GLOBAL_INT,
 )
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
-from rtshcua.mavlink.parameters import decode, is_bytewise
-from rtshcua.model.flat.contract import PLACE, Contract, Link, MotionKind
+from rtshcua.mavlink.parameters import decode, is_bytewise, value_of
+from rtshcua.model.flat.contract import PLACE, Addressee, Contract, Emission, Link, MotionKind, NumberOrigin
 from rtshcua.model.flat.mission import ALONG, TURN, Invocation, Plan
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
@@ -161,6 +163,18 @@ class MotionTarget(NamedTuple):
     points: Mapping[tuple[int, int], frozenset[tuple[int, int]]]
     altitude: int
     speed: int
+    payload: tuple["PayloadTarget", ...] = ()
+
+
+class PayloadTarget(NamedTuple):
+    """A command to payload: its number, who may be addressed besides the autopilot, and its parameters as fractions
+    (None: not a number). A `height`, in mm above home, is in place of the last one.
+    """
+
+    command: int
+    components: frozenset[int]
+    values: tuple[Fraction | None, ...]
+    height: int | None
 
 
 class HomeHeights(NamedTuple):
@@ -173,7 +187,8 @@ class HomeHeights(NamedTuple):
 def target_of_step(invocation: Invocation, policy: Policy) -> MotionTarget:
     """The motion of a step."""
     plan = invocation.plan
-    return MotionTarget(plan.kind, _points(plan, policy), plan.altitude, plan.speed)
+    payload = tuple(_payload_target(each, invocation.arguments, policy) for each in invocation.contract.emits)
+    return MotionTarget(plan.kind, _points(plan, policy), plan.altitude, plan.speed, payload)
 
 
 def target_of_link(link: Link, policy: Policy) -> MotionTarget:
@@ -185,6 +200,87 @@ def target_of_link(link: Link, policy: Policy) -> MotionTarget:
     return MotionTarget(motion.kind, _points(Plan(motion.kind, path, altitude, speed), policy), altitude, speed)
 
 
+_CAMERAS: Final = frozenset(range(100, 106))  # MAV_COMP_ID_CAMERA .. CAMERA6
+_GIMBALS: Final = frozenset({154, *range(171, 176)})  # MAV_COMP_ID_GIMBAL, GIMBAL2 .. GIMBAL6
+_TAKE_CONTROL: Final = enums.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+_POINT: Final = enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+_of_payload: Final = LAYOUTS[COMMAND_LONG].getter(
+    "command target_component param1 param2 param3 param4 param5 param6 param7"
+)
+_ROUNDED: Final = Fraction(1, 1 << 23)  # the greatest relative error of a 32-bit float
+
+
+def _payload_target(emitted: Emission, arguments: tuple[int, ...], policy: Policy) -> PayloadTarget:
+    components = {Addressee.CAMERA: _CAMERAS, Addressee.GIMBAL: _GIMBALS}.get(Addressee(emitted.addressee), frozenset())
+    values: list[Fraction | None] = []
+    height = None
+    for parameter in emitted.parameters:
+        cell = parameter.cell
+        value: Fraction | None = None
+        if parameter.origin == NumberOrigin.CONSTANT:
+            number = value_of(parameter.value)
+            value = None if isnan(number) else Fraction(number)
+        elif parameter.origin == NumberOrigin.ARGUMENT:
+            value = Fraction(arguments[cell], parameter.value)
+        elif parameter.origin == NumberOrigin.HEIGHT:
+            height = parameter.value if cell < 0 else arguments[cell]
+        else:
+            place = unproject(policy.projection, *arguments[cell : cell + 2])
+            value = Fraction(place[parameter.origin - NumberOrigin.LATITUDE], 10_000_000)
+        values.append(value)
+    return PayloadTarget(emitted.command, components, tuple(values), height)
+
+
+def ends_payload(frame: AuditedFrame) -> tuple[int, int] | None:
+    """The number and the addressee of a command that only ends pictures, a video, or the control of a gimbal."""
+    if frame.message != COMMAND_LONG or not frame.fields:
+        return None
+    command, component, one, *_ = _of_payload(frame.fields)
+    gives_back = command == _TAKE_CONTROL and one == -3
+    stops = command in (enums.MAV_CMD_IMAGE_STOP_CAPTURE, enums.MAV_CMD_VIDEO_STOP_CAPTURE)
+    no_distance = command == enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST and one == 0
+    return (command, component) if gives_back or stops or no_distance else None
+
+
+def begins_payload(frame: AuditedFrame) -> tuple[int, int] | None:
+    """The number and the addressee of the command that will have to end what a command to payload begins."""
+    if frame.message != COMMAND_LONG or not frame.fields or ends_payload(frame) is not None:
+        return None
+    command, component, *_ = _of_payload(frame.fields)
+    ends = {
+        enums.MAV_CMD_IMAGE_START_CAPTURE: enums.MAV_CMD_IMAGE_STOP_CAPTURE,
+        enums.MAV_CMD_VIDEO_START_CAPTURE: enums.MAV_CMD_VIDEO_STOP_CAPTURE,
+        enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST: enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        _TAKE_CONTROL: _TAKE_CONTROL,
+    }.get(command)
+    return None if ends is None else (ends, component)
+
+
+def _emitted(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
+    """Whether a COMMAND_LONG is a command to payload of the target, or takes control of the gimbal that it points."""
+    command, component, *values = _of_payload(frame.fields)
+    for each in target.payload:
+        if component != enums.MAV_COMP_ID_AUTOPILOT1 and component not in each.components:
+            continue
+        if command == _TAKE_CONTROL and each.command == _POINT:
+            ours = frame.system, enums.MAV_COMP_ID_ONBOARD_COMPUTER
+            if tuple(values[:6]) == (*ours, -1, -1, 0, 0):
+                return True
+        if command == each.command and all(map(_is_value, values, each.values[: 7 if each.height is None else 6])):
+            if each.height is None or (autopilot != PX4 and _is_near(values[6], each.height)):
+                return True
+            if autopilot == PX4 and _above_sea(values[6], each.height, home):
+                return True
+    return False
+
+
+def _is_value(found: float, wanted: Fraction | None) -> bool:
+    """Whether a parameter has a value; None: it is no number."""
+    if wanted is None:
+        return isnan(found)
+    return isfinite(found) and abs(Fraction(found) - wanted) <= abs(wanted) * _ROUNDED
+
+
 def is_part_of(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
     """Whether the frame makes an autopilot fly the target or a part of it."""
     if not frame.fields:
@@ -192,7 +288,9 @@ def is_part_of(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: 
     if frame.message == COMMAND_LONG:
         *parameters, number = layouts.of_command_long(frame.fields)
         obeys = _COMMANDS.get(number)
-        return obeys is not None and obeys(parameters, target, autopilot, home)
+        if obeys is None:
+            return _emitted(frame, target, autopilot, home)
+        return obeys(parameters, target, autopilot, home)
     if frame.message == COMMAND_INT and autopilot == PX4:
         return _repositions(frame.fields, target, home)
     if frame.message == SET_POSITION_TARGET_GLOBAL_INT and autopilot == ARDUPILOT and target.kind in _TRAVELS:

@@ -28,6 +28,8 @@ from rtshcua.ground.audit.frame_meaning import (
     FrameNature,
     HomeHeights,
     MotionTarget,
+    begins_payload,
+    ends_payload,
     frame_words,
     is_part_of,
     nature,
@@ -178,6 +180,7 @@ class FrameAudit:
         self._running: _Running | None = None
         self._latest: _Running | None = None  # the last dispatch, running or not
         self._left: _Suspect | None = None  # the first frame that is part of it
+        self._owed: set[tuple[int, int]] = set()  # what ends what was begun: command and component
         self.begun = False
         self._changed_us = -1  # the time of the last record
         self._before = _Allowed()  # what was allowed before the records of that time
@@ -309,12 +312,16 @@ class FrameAudit:
             return
         running = self._running
         suspect = _Suspect(frame, entry.number, entry.at_us, self._record, running is not None)
-        if not self._any(frame, allowed.targets):
+        ends = ends_payload(frame)
+        if not self._any(frame, allowed.targets) and (ends is None or ends not in self._owed):
             self._suspect = suspect
         elif running is not None and entry.at_us < running.since_us:  # frames are not sorted by time
             self._finding = _early(suspect, running.since_us, running.record)
         elif self._left is None and self._is_part_of_latest(frame, entry.at_us):
             self._left = suspect
+        begins = begins_payload(frame)
+        if begins is not None:
+            self._owed.add(begins)
 
     def _is_part_of_latest(self, frame: AuditedFrame, at_us: int) -> bool:
         """Whether a frame is part of the last dispatch, and not of what was allowed before it."""

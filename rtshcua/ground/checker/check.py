@@ -2,6 +2,7 @@
 
 from rtshcua.ground.checker.checks.accepts import check_accepts
 from rtshcua.ground.checker.checks.contracts import check_contracts, check_durability, check_fallbacks, check_records
+from rtshcua.ground.checker.checks.emits import check_emits
 from rtshcua.ground.checker.checks.missions import check_missions
 from rtshcua.ground.checker.checks.names import check_names
 from rtshcua.ground.checker.checks.parameters import check_parameters, check_sizes
@@ -34,6 +35,7 @@ CHECKS = (
     check_durability,
     check_accepts,
     check_survey_demands,
+    check_emits,
     check_nominals,
     check_tests,
     check_scenarios,

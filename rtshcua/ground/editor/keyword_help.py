@@ -45,6 +45,11 @@ KEYWORDS: Mapping[str, str] = {
     "this skill; `with` names the fields of the arguments, `where` the fields that must have a value.",
     "pictures": "What the pictures of a survey must show, with a camera of the vehicle: `every 10 m`, a pixel of at "
     "most `resolution 2 cm`, `overlap 80 % forward 70 % side`, at most `blur 50 %` of a pixel, ground within `relief`.",
+    "emits": "A command to a camera, a gimbal or other payload that the skill sends while it flies: `with` its "
+    "parameters, `at begin`, `at end`, `at each turn`, `at each waypoint`, or `every 10 m`.",
+    "succeeds": "What shows the success of a command to payload: `acknowledgement`, `image` or `attitude`, in a time.",
+    "required": "If this command to payload fails, the step has failed.",
+    "servos": "Outputs that drive no motor and no control surface: skills may set them.",
     "where": "Only if these fields have these values; after a clause, `where fitted`.",
     "here": "Where the vehicle is, or its height.",
     "policy": "Who may request what, where and when. Its version only increases.",

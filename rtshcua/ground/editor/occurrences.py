@@ -28,7 +28,7 @@ from rtshcua.model.ir.scenarios import (
     ScenarioDecl,
 )
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import AcceptsDecl, ArgumentValue, LinkDecl, ParameterDecl, SizesDecl, SkillDecl
+from rtshcua.model.ir.skills import AcceptsDecl, ArgumentValue, EmitsDecl, LinkDecl, ParameterDecl, SizesDecl, SkillDecl
 from rtshcua.model.ir.tests import (
     Asker,
     Assignment,
@@ -364,6 +364,8 @@ class _OccurrenceFinder:
         yield from self.names([] if skill.pictures is None else [skill.pictures.camera], NameKind.CAMERA)
         for accepts in skill.accepts:
             yield from self._accepts(accepts, owner)
+        for emits in skill.emits:
+            yield from self._emits(emits, owner, scope)
 
     def _accepts(self, accepts: AcceptsDecl, owner: str) -> Iterator[Occurrence]:
         """The names of MAVLink, and the parameters that are read from their fields."""
@@ -377,6 +379,16 @@ class _OccurrenceFinder:
             fields += each.fields
         for field in fields:
             yield Occurrence(field.span, NameTarget(NameKind.FIELD, field.text, accepts.name.text))
+
+    def _emits(self, emits: EmitsDecl, owner: str, scope: Scope) -> Iterator[Occurrence]:
+        """The command, its parameters, and the parameters of the skill that they are read from."""
+        command = emits.command.text
+        yield Occurrence(emits.command.span, NameTarget(NameKind.COMMAND, command))
+        for each in emits.parameters:
+            for field in each.fields:
+                yield Occurrence(field.span, NameTarget(NameKind.FIELD, field.text, command))
+            if isinstance(each.value, Reference) and each.value.name in scope:
+                yield Occurrence(each.value.span, NameTarget(NameKind.PARAMETER, each.value.name, owner))
 
     def _sizes(self, sizes: SizesDecl) -> Iterator[Occurrence]:
         yield from self.names((sizes.skill,), NameKind.DECLARED)

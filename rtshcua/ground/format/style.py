@@ -47,6 +47,7 @@ _PLAIN_ITEMS = (
     # of vehicles
     "identity", "home", "speed", "climb", "position_error", "endurance", "reserve", "cells", "clock", "time_zone",
     "elevation", "return_at", "brakes", "speeds", "accelerates", "wind", "not_fitted",
+    "servos",
     # of skills and steps
     "climb_to", "fly_to", "cover_area", "cover_levels", "hold_for", "stay", "timing_class", "deadline", "duration",
     "grace", "require", "assume", "maintain", "fallback", "energy", "record",
@@ -71,6 +72,7 @@ ITEMS = dict.fromkeys(_PLAIN_ITEMS, Style()) | {
     "accepts": _style("where", "with"),
     "pictures": _style("every", "resolution", "overlap", "blur", "relief"),
     "camera": _style("focal", "pixels", "every", "exposure"),
+    "emits": _style("with", "succeeds"),
     "airspace": _style("inside", "outside", aligned=False),
     "phase": _style(aligned=False, cuts=("{",)),
     "asked": _style("by", "through"),

@@ -3,11 +3,20 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from rtshcua.decision.tree import slots_read
+from rtshcua.ground.checker.checks.emits import (
+    ADDRESSEES,
+    SUCCESSES,
+    WAITS_US,
+    limit_of,
+    moment_of,
+    sent_numbers,
+)
 from rtshcua.ground.checker.context import Bound, CheckContext
 from rtshcua.ground.checker.name_scope import Argument
 from rtshcua.ground.checker.types import Kind
 from rtshcua.ground.lower.conditions import ConditionLowering, ConditionPlace
 from rtshcua.ground.lower.policy_checks import applies
+from rtshcua.ground.lower.tables import shortened
 from rtshcua.model.durability import WORDS
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import (
@@ -16,6 +25,9 @@ from rtshcua.model.flat.contract import (
     QUANTITY,
     ZONE,
     Contract,
+    Emission,
+    EmissionParameter,
+    EmissionSuccess,
     Facing,
     Link,
     Motion,
@@ -28,7 +40,8 @@ from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
-from rtshcua.model.ir.skills import LinkDecl, SkillDecl
+from rtshcua.model.ir.skills import EmitsDecl, LinkDecl, SkillDecl
+from rtshcua.model.quantity import Dimension
 
 #: default of `grace`: how long a clause may be unknown, us
 DEFAULT_GRACE_US = 500_000
@@ -106,6 +119,31 @@ class ContractLowering:
             energy=skill.energy.value,
             record=recorded(name.text for name in skill.record),
             reads=slots_read((*require, *assume, *maintain), self.vehicle, tuple(self.conditions.monitors.all)),
+            emits=self._emissions(skill, cells),
+        )
+
+    def _emissions(self, skill: SkillDecl, cells: Mapping[str, int]) -> tuple[Emission, ...]:
+        return tuple(self._emission(skill, emits, cells) for emits in skill.emits)
+
+    def _emission(self, skill: SkillDecl, emits: EmitsDecl, cells: Mapping[str, int]) -> Emission:
+        """Lower a command to payload, with all its parameters."""
+        moment, by = moment_of(emits), emits.success
+        assert moment is not None
+        success = EmissionSuccess.ACKNOWLEDGEMENT if by is None else SUCCESSES[by.by.text]
+        return Emission(
+            command=self._context.dialect.enums["MAV_CMD"][emits.command.text],
+            addressee=int(ADDRESSEES[emits.addressee.text]),
+            parameters=tuple(
+                EmissionParameter(int(sent.origin), -1 if sent.name is None else cells[sent.name], sent.value)
+                for sent in sent_numbers(self._context, skill, emits)
+            ),
+            moment=int(moment),
+            amount=0 if emits.every is None else emits.every.value,
+            success=int(success),
+            bound=limit_of(emits, Dimension.ANGLE, 0),
+            within_us=limit_of(emits, Dimension.DURATION, WAITS_US),
+            required=int(emits.required),
+            text=shortened(self._context.report.text(emits.span)),
         )
 
     def chain(self, links: Sequence[LinkDecl]) -> tuple[Link, ...]:

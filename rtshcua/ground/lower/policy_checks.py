@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.checks.emits import check_payload
 from rtshcua.ground.checker.checks.zones import named
 from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import references
@@ -147,7 +148,10 @@ def check_fitted(
             help = "remove the signal from the rule" if rule.kind == "permit" else "end the rule with `where fitted`"
             with context.report.within(brought_about(rule)):
                 _sensors(context, vehicle, rule.when, help)
+    skills = tuple(skills)
     clauses = [clause for skill in skills for clause in (*skill.require, *skill.assume, *skill.maintain)]
+    for skill in skills:
+        check_payload(context, vehicle, skill)
     for clause in clauses:
         if not clause.where_fitted:
             _sensors(context, vehicle, clause.condition, "write the clause on a line of its own, with `where fitted`")

@@ -78,4 +78,5 @@ def lower_vehicle(
         time_zone="" if zone is None else zone.text,
         time_zone_data="" if zone is None else time_zones.VERSION,
         offsets=() if zone is None else time_zones.offsets(zone.text),
+        servos=tuple(sorted({servo.value for servo in vehicle.servos})),
     )

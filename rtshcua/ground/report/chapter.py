@@ -33,6 +33,7 @@ from rtshcua.ground.report.prose.rules_and_skills import (
     describe_airspace,
     describe_chain,
     describe_clause,
+    describe_emitted,
     describe_evidence,
     describe_left_out,
     describe_members,
@@ -334,6 +335,7 @@ def _skill(subject: ReportedPolicy, skill: SkillDecl, changed: bool) -> SkillVie
         as_link=AS_LINK if skill.name.text in _last_links(subject) else "",
         record=describe_record(skill),
         accepted=tuple(describe_accepted(skill)),
+        emitted=tuple(describe_emitted(skill)),
         place=subject.place(skill.span),
         changed=changed,
     )

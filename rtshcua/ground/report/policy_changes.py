@@ -184,6 +184,7 @@ def _skill(contract: Contract, policy: Policy) -> Mapping[str, Callable[[], str]
         "fallback": lambda: _chain(contract.fallback, policy),
         "energy": lambda: f"at most {display(contract.energy, Dimension.RATIO)} of a full charge",
         "record": lambda: named(sorted(contract.record)),
+        "emits": lambda: listed([name(each.text) for each in contract.emits]) or "nothing",
     }
 
 

@@ -111,7 +111,7 @@ class SkillView:
     """A skill and its contract. `as_link` describes the difference at the end of a chain, empty if there is none.
 
     `patterns` are the patterns of a survey. `left_out` are the clauses that do not apply because the vehicle lacks a
-    sensor. `accepted` is what a client of a gateway sends for the skill.
+    sensor. `accepted` is what a client of a gateway sends for the skill, `emitted` what the skill sends to payload.
     """
 
     name: str
@@ -128,6 +128,7 @@ class SkillView:
     as_link: str
     record: str
     accepted: tuple[str, ...]
+    emitted: tuple[str, ...]
     place: str
     changed: bool
 

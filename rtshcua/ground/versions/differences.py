@@ -8,6 +8,8 @@ sets, tables, derived zones.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import PLACE, ZONE, Contract, Link, Parameter
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
@@ -58,6 +60,7 @@ class PolicyMeaning:
             "brakes": (vehicle.braking, vehicle.reaction_us),
             "return": vehicle.return_altitude,
             "speeds": vehicle.speeds,
+            "servos": vehicle.servos,
         }
 
     def zones(self) -> Mapping[str, Fields]:
@@ -128,6 +131,7 @@ class PolicyMeaning:
             "fallback": self._chain(contract.fallback),
             "energy": contract.energy,
             "record": frozenset(contract.record),
+            "emits": tuple(replace(each, text="") for each in contract.emits),
         }
 
     def _rule(self, rule: Rule) -> RuleMeaning:

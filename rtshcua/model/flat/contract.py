@@ -87,12 +87,84 @@ class Motion(Extended, frozen=True):
     facing: int = 0
 
 
-class Contract(Flat, frozen=True):
+class Addressee(IntEnum):
+    """The component that a command to payload is for."""
+
+    VEHICLE = 0  # the autopilot
+    CAMERA = 1
+    GIMBAL = 2
+
+
+class EmissionMoment(IntEnum):
+    """When a command to payload is sent. The last two repeat it, by a distance in mm or a time in us."""
+
+    BEGIN = 0
+    END = 1
+    TURN = 2  # at each point of the path between its first and its last
+    WAYPOINT = 3  # at each point of the path
+    DISTANCE = 4
+    TIME = 5
+
+
+class EmissionSuccess(IntEnum):
+    """What shows that a command to payload had its effect."""
+
+    ACKNOWLEDGEMENT = 0
+    IMAGE = 1  # CAMERA_IMAGE_CAPTURED or CAMERA_FEEDBACK
+    ATTITUDE = 2  # GIMBAL_DEVICE_ATTITUDE_STATUS, within a bound
+
+
+class NumberOrigin(IntEnum):
+    """Where a parameter of a command to payload comes from."""
+
+    CONSTANT = 0
+    ARGUMENT = 1
+    LATITUDE = 2
+    LONGITUDE = 3
+    HEIGHT = 4
+
+
+class EmissionParameter(Flat, frozen=True):
+    """One of the seven parameters of a command to payload, a 32-bit float.
+
+    `value` is its bits (`CONSTANT`, `cell` is -1), or what divides the argument at `cell` (`ARGUMENT`). A place at
+    `cell` gives degrees, and `value` is 0. A height in mm above home is the argument at `cell`, or `value` if that is
+    -1; it is sent in metres above what the autopilot expects.
+    """
+
+    origin: int
+    cell: int
+    value: int
+
+
+class Emission(Flat, frozen=True):
+    """A command (MAV_CMD) that a skill sends to payload while it flies.
+
+    `amount` is the distance in mm or the time in us between two, 0 if it is not repeated. Success must be seen within
+    `within_us`, of an attitude within `bound` (1e-7 degree, else 0). If it is `required` (1), its failure is that of
+    the step.
+    """
+
+    command: int
+    addressee: int
+    parameters: tuple[EmissionParameter, ...]
+    moment: int
+    amount: int
+    success: int
+    bound: int
+    within_us: int
+    required: int
+    text: str
+
+
+class Contract(Extended, frozen=True):
     """A skill contract (section 2: `op`, `pre`, `ddl`, `vw`, `sc`, `inv`, `f_b`, `ev`). Times in us, energy in
     1/10000.
 
     `phases` are names; empty means any. `reads` are the slots that its clauses read, ascending.
     """
+
+    LEAST: ClassVar[int] = 16
 
     name: str
     parameters: tuple[Parameter, ...]
@@ -110,3 +182,4 @@ class Contract(Flat, frozen=True):
     energy: int
     record: tuple[str, ...]
     reads: tuple[int, ...]
+    emits: tuple[Emission, ...] = ()

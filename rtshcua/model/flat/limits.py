@@ -37,6 +37,11 @@ MAX_PATH = 8_192  # points
 #: edges of zones that the legs of a mission's paths are compared with, plus one for each leg and zone: a request
 #: waits for those of its step, and the boundary must answer within a second in flight
 MAX_COMPARED = 1 << 23
+MAX_EMISSIONS = 8  # commands to payload, in one contract
+MAX_PAYLOAD_WAIT = 60_000_000  # us: the longest wait for the effect of a command to payload
+MIN_EMISSION_INTERVAL = 100_000  # us: between two commands to payload of one kind
+MAX_DIVISOR = 1 << 30  # of an argument, for a parameter of a command to payload
+MAX_SERVOS = 32
 MAX_MONITORS = 32
 MAX_WINDOW = 600_000_000  # us: how far back a temporal monitor looks
 MAX_GAP = 1_000_000  # us: after a longer interval between two observations, the truth in between is unknown

@@ -1,11 +1,12 @@
 """The payload of a policy envelope: all authority in one signed document."""
 
 from enum import IntEnum
+from typing import ClassVar
 
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, Link
 from rtshcua.model.flat.signal import Signal
-from rtshcua.model.flat.struct import Flat
+from rtshcua.model.flat.struct import Extended, Flat
 from rtshcua.model.flat.zone import Projection, Zone
 
 
@@ -111,7 +112,7 @@ class Speeds(Flat, frozen=True):
     flight_us: int
 
 
-class VehicleLimits(Flat, frozen=True):
+class VehicleLimits(Extended, frozen=True):
     """The one aircraft that this policy is for. Lengths mm, speeds mm/s, times us, charge 1/10000.
 
     `position`, `height`, `battery` are the state slots of the well-known signals (-1: the policy declares none).
@@ -124,8 +125,11 @@ class VehicleLimits(Flat, frozen=True):
 
     Local time is `utc_offset_us` from UTC. If it is that of a time zone, given by its IANA name, `time_zone_data`
     is the version of the time-zone data, `utc_offset_us` is 0, and `offsets` alternates between a moment (UTC, us)
-    and the offset from it on, and ends with the moment from which local time is unknown.
+    and the offset from it on, and ends with the moment from which local time is unknown. `servos` are the servo
+    outputs that skills may set, ascending.
     """
+
+    LEAST: ClassVar[int] = 23
 
     name: str
     identity: str
@@ -150,6 +154,7 @@ class VehicleLimits(Flat, frozen=True):
     time_zone: str = ""
     time_zone_data: str = ""
     offsets: tuple[int, ...] = ()
+    servos: tuple[int, ...] = ()
 
 
 class LeftOut(Flat, frozen=True):

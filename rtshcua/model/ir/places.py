@@ -174,3 +174,4 @@ class VehicleDecl(Node):
     time_zone: Name | None = None  # `clock "Europe/Berlin"`
     cells: Quantity | None = None  # `cells 4`: the number in series, by which `battery.cell` is divided
     cameras: tuple[CameraDecl, ...] = ()  # read on the ground alone
+    servos: tuple[Quantity, ...] = ()  # `servos 9, 10`: outputs that no part of the vehicle's motion uses

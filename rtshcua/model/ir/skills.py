@@ -103,6 +103,33 @@ class AcceptsDecl(Node):
     arguments: tuple[SourcedArgument, ...]
 
 
+class EmittedParameter(Node):
+    """`param3 = 1`, `param1 = pitch`, `param5 = unset`, `(param5, param6) = target`: a parameter of a command."""
+
+    fields: tuple[Name, ...]  # latitude and longitude, for a parameter of the skill that is a position
+    value: Quantity | Reference  # a name: of a parameter of the skill, of an enumerator of the dialect, or `unset`
+
+
+class SuccessDecl(Node):
+    """`succeeds with attitude within 2 deg within 3 s`: what shows that a command to payload had its effect."""
+
+    by: Name  # image, attitude, acknowledgement
+    limits: tuple[Quantity, ...]  # a time, and an angle of an attitude
+
+
+class EmitsDecl(Node):
+    """`emits MAV_CMD_IMAGE_START_CAPTURE to camera with param3 = 1 every 10 m`: a command to payload."""
+
+    command: Name
+    addressee: Name  # camera, gimbal, vehicle
+    parameters: tuple[EmittedParameter, ...]
+    once: Name | None  # `at begin`, `at end`
+    each: Name | None  # `at each turn`, `at each waypoint`
+    every: Quantity | None  # one of these three
+    success: SuccessDecl | None
+    required: bool  # its failure is that of the step
+
+
 class PicturesDecl(Node):
     """`pictures by mapper every 10 m resolution 2 cm overlap 80 % forward 70 % side blur 50 % relief 5 m`.
 
@@ -163,6 +190,7 @@ class SkillDecl(Node, kw_only=True):
     sized: tuple[Sized, ...] = ()
     accepts: tuple[AcceptsDecl, ...] = ()
     pictures: PicturesDecl | None = None
+    emits: tuple[EmitsDecl, ...] = ()
 
 
 class GivenSize(Node):

@@ -19,7 +19,8 @@ from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.enforcement.frames import FrameSession
-from rtshcua.onboard.ports import ALWAYS, Command
+from rtshcua.onboard.enforcement.payload_gate import payload_of
+from rtshcua.onboard.ports import ALWAYS, Command, PayloadFrame
 from rtshcua.wire import boundary_chain
 from rtshcua.wire.boundary_chain import BoundaryChain, Tag
 from rtshcua.wire.permit import AGAIN, WITHDRAWN, Permit, open_permit
@@ -27,7 +28,10 @@ from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
 #: a command without its token, and until when it may be sent
-_Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool, tuple[int, ...], tuple[int, ...]]
+_Made = tuple[
+    str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool, tuple[int, ...], tuple[int, ...],
+    tuple[PayloadFrame, ...], tuple[int, ...],
+]  # fmt: skip
 #: the commands of a mission, by kind, step and link
 Made = dict[tuple[int, int, int], _Made]
 
@@ -94,10 +98,10 @@ class Commands:
         in the bundle.
         """
         if kind == STEP:
-            return Command(token, *self._made[STEP, step, -1], not_after_us)
+            return _command(token, self._made[STEP, step, -1], not_after_us)
         if kind == FALLBACK_LINK and link < 0 and (STEP, step, -1) in self._made:
-            return Command(token, *self._targets[link], not_after_us)
-        return Command(token, *self._made[kind, step if kind == FALLBACK_LINK else -1, link], not_after_us)
+            return _command(token, self._targets[link], not_after_us)
+        return _command(token, self._made[kind, step if kind == FALLBACK_LINK else -1, link], not_after_us)
 
     def links(self, step: int) -> list[tuple[int, int]]:
         """Kind and number of each link behind a step: its chain, then the contingency."""
@@ -107,8 +111,11 @@ class Commands:
     def _of_step(self, invocation: Invocation) -> _Made:
         plan, contract = invocation.plan, invocation.contract
         held_us = _hold_us(contract, invocation.arguments)
-        geo, levels = self._geo(plan.path), (plan.heights, plan.headings)
-        return contract.name, plan.kind, plan.path, geo, plan.altitude, plan.speed, held_us, True, *levels
+        payload = payload_of(contract, invocation.arguments, len(plan.path) // 2, self._policy)
+        return (
+            contract.name, plan.kind, plan.path, self._geo(plan.path), plan.altitude, plan.speed, held_us, True,
+            plan.heights, plan.headings, payload, self._policy.vehicle.servos,
+        )  # fmt: skip
 
     def _of_link(self, link: Link) -> _Made:
         contract = self._policy.contracts[link.skill]
@@ -119,11 +126,16 @@ class Commands:
             path = link.arguments[cell : cell + 2]
         altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
         held_us = 0 if link.limit_us else _hold_us(contract, link.arguments)  # the link's own time counts
-        return contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us, False, (), ()
+        return contract.name, motion.kind, path, self._geo(path), altitude, speed, held_us, False, (), (), (), ()
 
     def _geo(self, path: Sequence[int]) -> tuple[int, ...]:
         projection = self._policy.projection
         return tuple([part for x, y in zip(path[::2], path[1::2], strict=True) for part in unproject(projection, x, y)])
+
+
+def _command(token: int, made: _Made, not_after_us: int) -> Command:
+    """The command of a token, valid until a time."""
+    return Command(token, *made[:10], not_after_us, *made[10:])
 
 
 def _hold_us(contract: Contract, arguments: tuple[int, ...]) -> int:

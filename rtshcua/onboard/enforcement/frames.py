@@ -20,13 +20,27 @@ from typing import Final, Protocol
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.framing import SIGNATURE
-from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, HEARTBEAT, LAYOUTS, PARAM_VALUE
+from rtshcua.mavlink.layouts import (
+    COMMAND_LONG,
+    EXTENDED_SYS_STATE,
+    GLOBAL_POSITION_INT,
+    HEARTBEAT,
+    LAYOUTS,
+    PARAM_VALUE,
+)
 from rtshcua.mavlink.modes import is_vehicle
 from rtshcua.mavlink.parameters import is_bytewise, value_of
 from rtshcua.mavlink.signing import SignedLink
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.enforcement import allow_list
 from rtshcua.onboard.enforcement.allow_list import Frame, read_frame
+from rtshcua.onboard.enforcement.payload_gate import (
+    NOT_COVERED,
+    WRONG_TARGET,
+    PayloadGate,
+    PayloadNumbers,
+    read_payload,
+)
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.preparation import ParameterWrite
@@ -52,7 +66,6 @@ _position: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("lat lon alt relative_alt
 NOT_ONE_FRAME: Final = Refusal("frame/not-one-frame", "the frame is not exactly one complete, unsigned MAVLink 2 frame")
 NO_VEHICLE: Final = Refusal("frame/no-vehicle", "no autopilot was heard yet")
 NOT_OURS: Final = Refusal("frame/not-ours", "the frame has another sender id")
-WRONG_TARGET: Final = Refusal("frame/wrong-target", "the frame is for another system or component, or a broadcast")
 FORCED_ARMING: Final = Refusal("frame/forced-arming", "the frame arms or disarms past the autopilot's own checks")
 AFTER_START: Final = Refusal(
     "frame/after-start", "the frame changes a fence after takeoff or while the motors are armed"
@@ -64,7 +77,6 @@ NOT_DOWN: Final = Refusal(
 )
 SESSION_OVER: Final = Refusal("frame/session-over", "the boundary signed that its session ends here")
 NO_SESSION: Final = Refusal("frame/no-session", "the frame moves the vehicle without a permit")
-NOT_COVERED: Final = Refusal("frame/not-covered", "the frame is not part of the permitted command")
 #: the leg to it was never checked
 OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "the frame is for a point of the path before its turn")
 #: not sent, without a failure
@@ -142,6 +154,7 @@ class FrameSession:
         self._prepared_us = 0  # and until when
         self._home_amsl: int | None = None  # mm
         self._settled_amsl: int | None = None  # the same, at the time of the takeoff permit
+        self._payload = PayloadGate()
 
     def sign_with(self, signer: SignedLink) -> None:
         """Sign outgoing frames from now on. Raises RuntimeError if they are signed already: a key is never replaced."""
@@ -152,13 +165,15 @@ class FrameSession:
     def open(self, command: Command) -> None:
         """Let the frames of one command pass, in place of those before."""
         self._session, self._started, self.let_out = _Session(command), True, False
+        self._payload.open(command.payload, command.servos, self._system)
         self.prepared()
         if self._settled_amsl is None or command.kind == MotionKind.CLIMB:
             self._settled_amsl = self._home_amsl
 
     def close(self) -> None:
-        """Let nothing more pass that moves the vehicle."""
+        """Let nothing more pass that moves the vehicle, and of the payload only what ends something."""
         self._session = None
+        self._payload.close()
 
     def prepare(self, writes: Iterable[ParameterWrite], not_after_us: int) -> None:
         """Allow these parameters to be set while the vehicle is on the ground."""
@@ -180,6 +195,7 @@ class FrameSession:
         """
         heard = read_frame(frame)
         if heard is None or heard.component != AUTOPILOT:
+            self._hear_another(heard)
             return
         if heard.message == HEARTBEAT:
             kind, autopilot = _identity(heard.fields)
@@ -200,6 +216,11 @@ class FrameSession:
             name, bits = allow_list.told(heard, bytewise=is_bytewise(self._autopilot))
             if name == "FENCE_TYPE":
                 self._types = 0.0 if bits is None else value_of(bits)
+
+    def _hear_another(self, heard: Frame | None) -> None:
+        """Process a frame of another component, if it is one: only the payload of the vehicle matters."""
+        if heard is not None and heard.message == HEARTBEAT and heard.system == self._system:
+            self._payload.hear(heard)
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
         """The octets to send for a frame at a monotonic time, or why it is refused."""
@@ -258,16 +279,37 @@ class FrameSession:
             if setting is not None:
                 return NOT_LISTED
         # 4. what is permitted now
-        return self._refuse_motion(frame, now_us) or True
+        return self._refuse_permitted(frame, now_us) or True
+
+    def _refuse_permitted(self, frame: Frame, now_us: int) -> Refusal | None:
+        """Why a frame is neither a command to payload nor part of the motion that is permitted now."""
+        payload = read_payload(frame)
+        if payload is not None:
+            return self._refuse_payload(payload, now_us)
+        if frame.target is not None and frame.target[1] != AUTOPILOT:
+            return WRONG_TARGET
+        return self._refuse_motion(frame, now_us)
 
     def _refuse_always(self, frame: Frame) -> Refusal | None:
         """Why no permit could allow a frame; None if one could."""
         if (frame.system, frame.component) != (self._system, OURS):
             return NOT_OURS
-        if frame.target is not None and frame.target != (self._system, AUTOPILOT):
+        if frame.target is not None and not self._is_for(frame.message, *frame.target):
             camera = frame.target[0] == self._system and allow_list.asks_camera(frame)
             return None if camera else WRONG_TARGET
         return FORCED_ARMING if allow_list.is_forced_arming(frame) else None
+
+    def _is_for(self, message: int, system: int, component: int) -> bool:
+        """Whether the addressee is the autopilot, or of a command also a camera or a gimbal of the vehicle."""
+        if system != self._system:
+            return False
+        return component == AUTOPILOT or (message == COMMAND_LONG and self._payload.has(component))
+
+    def _refuse_payload(self, payload: PayloadNumbers, now_us: int) -> Refusal | None:
+        refused = self._payload.refuse(payload, now_us, self._autopilot, self._home_amsl)
+        if refused is None:
+            self.let_out = True
+        return refused
 
     def _refuse_ahead(self, octets: bytes, command: Command) -> Refusal | None:
         """Why a frame is not signed ahead for a command: the rules of the gate, as if it were open for the command."""
@@ -279,6 +321,8 @@ class FrameSession:
         refused = self._refuse_always(frame)
         if refused is not None:
             return refused
+        if frame.target is not None and frame.target[1] != AUTOPILOT:
+            return WRONG_TARGET
         if not allow_list.carries_out(frame, command, self._autopilot, self._home_amsl):
             return NOT_COVERED
         if allow_list.point_of(frame) is None or allow_list.leads_to(frame, command, 0, self._home_amsl):

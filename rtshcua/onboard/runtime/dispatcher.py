@@ -9,10 +9,10 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import executor
 from rtshcua.onboard.enforcement.executor import Executor
 from rtshcua.onboard.enforcement.isolated import IsolatedExecutor
-from rtshcua.onboard.ports import Command, Frozen, Hindered, Obeyed, Release
+from rtshcua.onboard.ports import Command, Frozen, Hindered, Obeyed, PayloadOutcome, Release
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.permit import WITHDRAWN
-from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
+from rtshcua.wire.request import FALLBACK_LINK, NOTHING, STEP, Ref
 
 #: The default until enough was measured, in us: ten times more than measured on the development machines.
 CONSERVATIVE_US = 20_000
@@ -157,6 +157,12 @@ class Dispatcher:
         if self.flying(event.token) is not None:
             self._journal.note(now, event.text)
             self.hindrance = event.text
+
+    def told_of_payload(self, now: Now, event: PayloadOutcome) -> None:
+        """Record what became of a command to payload, of the flying command or of one before it."""
+        active = self.flying(event.token)
+        ref = NOTHING if active is None else active.ref
+        self._journal.effect(now, f"payload.{event.what}", ref, detail=event.text)
 
     def flying(self, token: int) -> Active | None:
         """The flying command, if it is this one: a late report about another one is ignored."""

@@ -238,6 +238,8 @@ class EventHandler:
                 self._controller.dispatcher.obeyed(now, event)
             case ports.Hindered():
                 self._controller.dispatcher.hindered(now, event)
+            case ports.PayloadOutcome():
+                self._controller.dispatcher.told_of_payload(now, event)
             case ports.Anchored():
                 self._journal.effect(now, ANCHORED, detail=event.note)
             case ports.ImageReported():

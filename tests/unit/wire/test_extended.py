@@ -6,6 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from reference import flat_case as flat
+from reference import payload_case
 from reference.bundle_case import THE_MISSION, THE_POLICY
 from rtshcua.model.flat.contract import Facing, Motion
 from rtshcua.model.flat.mission import ALONG, Mission, Plan
@@ -35,9 +36,19 @@ def test_last_fields_with_their_defaults_are_left_out(part: Flat, made: Any) -> 
 
 def test_motions_and_plans_deep_inside_are_shortened() -> None:
     contract = builtins_of(THE_POLICY)[Policy.__struct_fields__.index("contracts")][0]
-    assert len(contract[2]) == 4
+    assert (len(contract), len(contract[2])) == (16, 4)
+    assert len(builtins_of(THE_POLICY)[Policy.__struct_fields__.index("vehicle")]) == 23
     for step in builtins_of(THE_MISSION)[Mission.__struct_fields__.index("invocations")]:
         assert len(step[10][2]) == len(step[11]) == 4
+
+
+SHOT = payload_case.emission(2000)
+
+
+def test_contracts_and_vehicles_with_payload_have_all_fields() -> None:
+    contract, vehicle = THE_POLICY.contracts[0], THE_POLICY.vehicle
+    assert builtins_of(replace(contract, emits=(SHOT,)))[16] == [builtins_of(SHOT)]
+    assert builtins_of(replace(vehicle, servos=(9, 10)))[23] == [9, 10]
 
 
 def with_plan(*fields: Any) -> bytes:

@@ -76,6 +76,7 @@ FORMS: dict[str, Action] = {
     "accelerates": part("accelerates", node(Acceleration, "speed", "time")),
     "wind": part("wind"),
     "not_fitted": part("without"),
+    "servos": part("servos", several),
 }
 
 
@@ -318,6 +319,7 @@ def vehicle(reader: Reader, span: Span, name: Name, *given: Part) -> None:
             flight=flight,
             cells=found.get("cells"),
             cameras=tuple(found["camera"]),
+            servos=found.get("servos", ()),
         ),
         name,
     )

@@ -13,6 +13,8 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import (
     AcceptsDecl,
     ClauseDecl,
+    EmitsDecl,
+    EmittedParameter,
     FixedFieldDecl,
     GivenSize,
     LinkDecl,
@@ -24,6 +26,7 @@ from rtshcua.model.ir.skills import (
     SkillDecl,
     SourcedArgument,
     Substitute,
+    SuccessDecl,
 )
 
 
@@ -38,7 +41,7 @@ class FurtherName(NamedTuple):
 #: the parts of a skill that may be a size, by their first keyword
 _SIZED: Final = {"deadline": "deadline", "valid": "validity", "lasts": "duration", "grace": "grace", "energy": "energy"}
 #: parts of a skill that may repeat: all of them apply
-_REPEATED = ("require", "assume", "maintain", "accepts")
+_REPEATED = ("require", "assume", "maintain", "accepts", "emits")
 #: the form of a parameter's name on both autopilots; MAVLink has 16 characters for it
 _AUTOPILOT_PARAMETER: Final = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 
@@ -87,6 +90,7 @@ FORMS: dict[str, Action] = {
     "fixed_fields": several,
     "sourced_arguments": several,
     "substitute": node(Substitute, "kind"),
+    "emitted_parameters": several,
 }
 
 
@@ -162,6 +166,79 @@ def accepts(
         span=span, kind=kind, name=name, autopilot=autopilot, where=where or (), arguments=arguments or ()
     )
     return Part("accepts", span, made)
+
+
+class EmissionTime(NamedTuple):
+    """When a command to payload is sent."""
+
+    once: Name | None = None
+    each: Name | None = None
+    every: Quantity | None = None
+
+
+def emitted_parameter(reader: Reader, span: Span, field: Name, value: Quantity | Reference) -> EmittedParameter:
+    """`param3 = 1`, `param1 = pitch`."""
+    reader.undotted(field, "parameter")
+    return EmittedParameter(span=span, fields=(field,), value=value)
+
+
+def emitted_place(reader: Reader, span: Span, latitude: Name, longitude: Name, value: Reference) -> EmittedParameter:
+    """`(param5, param6) = target`."""
+    for each in (latitude, longitude):
+        reader.undotted(each, "parameter")
+    return EmittedParameter(span=span, fields=(latitude, longitude), value=value)
+
+
+def once(reader: Reader, span: Span, name: Name) -> EmissionTime:
+    """`at begin`."""
+    return EmissionTime(once=name)
+
+
+def each_time(reader: Reader, span: Span, name: Name) -> EmissionTime:
+    """`at each turn`."""
+    return EmissionTime(each=name)
+
+
+def repeatedly(reader: Reader, span: Span, every: Quantity) -> EmissionTime:
+    """`every 10 m`."""
+    return EmissionTime(every=every)
+
+
+def limit(reader: Reader, span: Span, quantity: Quantity) -> Quantity:
+    """`within 3 s`."""
+    return quantity
+
+
+def success(reader: Reader, span: Span, by: Name, *limits: Quantity) -> SuccessDecl:
+    """`succeeds with attitude within 2 deg within 3 s`."""
+    return SuccessDecl(span=span, by=by, limits=limits)
+
+
+def emits(
+    reader: Reader,
+    span: Span,
+    command: Name,
+    addressee: Name,
+    parameters: tuple[EmittedParameter, ...] | None,
+    time: EmissionTime,
+    success: SuccessDecl | None,
+    required: Any,
+) -> Part:
+    """`emits MAV_CMD_IMAGE_START_CAPTURE to camera with param3 = 1 every 10 m`."""
+    for each in (command, addressee):
+        reader.undotted(each, "command")
+    made = EmitsDecl(
+        span=span,
+        command=command,
+        addressee=addressee,
+        parameters=parameters or (),
+        once=time.once,
+        each=time.each,
+        every=time.every,
+        success=success,
+        required=required is not None,
+    )
+    return Part("emits", span, made)
 
 
 def parameter(
@@ -287,6 +364,7 @@ def skill(
             sized=(*(amount for amount in amounts.values() if isinstance(amount, Sized)), *sized_shown),
             accepts=tuple(found["accepts"]),
             pictures=shown,
+            emits=tuple(found["emits"]),
         ),
         name,
     )

@@ -12,6 +12,7 @@ from rtshcua.ground.report.prose.phrases import (
     listed,
     name,
     named,
+    quantity,
     sentence,
 )
 from rtshcua.model.durability import WORDS as DURABILITIES
@@ -23,6 +24,7 @@ from rtshcua.model.ir.skills import (
     AcceptsDecl,
     ArgumentValue,
     ClauseDecl,
+    EmitsDecl,
     FixedFieldDecl,
     LinkDecl,
     MotionDecl,
@@ -252,6 +254,31 @@ _DATUM: Final = {"home": " above home", "sea": " above sea", "frame": " in the f
 def describe_accepted(skill: SkillDecl) -> Iterator[str]:
     """Describe what a MAVLink client sends for a skill, one item each."""
     yield from map(_accepted, skill.accepts)
+
+
+def describe_emitted(skill: SkillDecl) -> Iterator[str]:
+    """Describe what a skill sends to cameras, gimbals and other payload, one item each."""
+    yield from map(_emitted, skill.emits)
+
+
+def _emitted(emits: EmitsDecl) -> str:
+    given = [
+        f"{named([each.text for each in parameter.fields])} "
+        + (quantity(parameter.value) if isinstance(parameter.value, Quantity) else name(parameter.value.name))
+        for parameter in emits.parameters
+    ]
+    to = "the autopilot" if emits.addressee.text == "vehicle" else f"the {emits.addressee.text}"
+    if emits.every is not None:
+        when = f"every {display(emits.every.value, emits.every.dimension)}"
+    elif emits.each is not None:
+        when = f"at each {emits.each.text}"
+    else:
+        when = "" if emits.once is None else f"at the {emits.once.text}"
+    words = f"{when}, {name(emits.command.text)} to {to}{f' with {listed(given)}' if given else ''}"
+    if emits.success is not None:
+        limits = [f"within {display(each.value, each.dimension)}" for each in emits.success.limits]
+        words += f"; success is an {emits.success.by.text} {' '.join(limits)}"
+    return sentence(words + ("; if it fails, the step has failed" if emits.required else ""))
 
 
 def _accepted(accepts: AcceptsDecl) -> str:

@@ -179,6 +179,9 @@ def describe_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
     if vehicle.time_zone is not None:
         yield "Local time", f"that of {vehicle.time_zone.text}, by the time-zone data {time_zones.VERSION}"
     yield from (("Camera", _camera(camera)) for camera in vehicle.cameras)
+    if vehicle.servos:
+        outputs = listed([str(servo.value) for servo in vehicle.servos])
+        yield "Free servo outputs", f"{outputs}; skills may set them"
     if vehicle.without:
         signals = named([each.text for each in vehicle.without])
         yield "Not fitted", f"sensors for {signals}; clauses that count only where they are fitted are left out"

@@ -21,6 +21,7 @@ from rtshcua.ground.report.prose.rules_and_skills import (
     describe_chain,
     describe_clause,
     describe_delegation,
+    describe_emitted,
     describe_evidence,
     describe_members,
     describe_motion,
@@ -196,6 +197,7 @@ def tell_skill(skill: SkillDecl, names: Vocabulary) -> object:
         describe_chain(skill.fallback, names),
         describe_record(skill),
         list(describe_accepted(skill)),
+        list(describe_emitted(skill)),
     )
 
 

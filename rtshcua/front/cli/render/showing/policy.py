@@ -52,7 +52,12 @@ def fields(policy: Policy, contract: Contract) -> list[tuple[str, str]]:
         *_list("fallback", chain),
         ("energy", f"at most {prose.ratio(contract.energy)}"),
         ("record", ", ".join(contract.record) or _NOTHING),
+        *(_list("emits", _emitted(contract)) if contract.emits else []),
     ]
+
+
+def _emitted(contract: Contract) -> list[str]:
+    return [each.text.removeprefix("emits").lstrip() for each in contract.emits]
 
 
 def _texts(clauses: Sequence[Clause]) -> list[str]:
@@ -127,6 +132,8 @@ def _of_vehicle(policy: Policy) -> Iterator[tuple[str, str]]:
     yield "energy", f"a full battery hovers {hover}; {reserve} stay in reserve"
     if vehicle.without:
         yield "without", f"{', '.join(vehicle.without)}: not fitted; what reads it `where fitted` is left out"
+    if vehicle.servos:
+        yield "servos", f"{', '.join(map(str, vehicle.servos))}: free outputs, which skills may set"
     offset, data = f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h", vehicle.time_zone_data
     yield "local time", f"{vehicle.time_zone}, by the time-zone data {data}" if vehicle.time_zone else offset
 

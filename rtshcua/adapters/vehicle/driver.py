@@ -375,8 +375,9 @@ class Driver:
             send.append(messages.request(self.system, "SYSTEM_TIME"))
         if now_us >= self.stream_requests.due_us:
             send += self.stream_requests.due(self.system, now_us)
-        triggers = self.flavour is ARDUPILOT
-        send += self._ask_images(self.images.due(self.system, now_us, triggers=triggers))
+        if self.images.watches:
+            triggers = self.flavour is ARDUPILOT
+            send += self._ask_images(self.images.due(self.system, now_us, triggers=triggers))
         if self._timed and not self._was_ready:
             send += self._ask_once(now_us)
         if self.asks_first is not None:

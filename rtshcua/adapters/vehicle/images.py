@@ -46,6 +46,8 @@ EARNED_US: Final = 50_000
 TRIES: Final = 3
 MOST_REQUESTS: Final = 2_000
 ANSWER_US: Final = 700_000
+#: how often an image of any camera is requested
+REQUEST_US: Final = 200_000
 #: how often a camera is asked how many images it has taken, and at first
 EACH_US: Final = 5_000_000
 FIRST_US: Final = 1_000_000
@@ -112,9 +114,15 @@ class ImageObserver:
         #: the mission takes pictures: ask an autopilot for the state of its camera before the flight
         self.expected = False
         self._accuracy: tuple[int, int | None, int | None] | None = None
+        self._next_us = 0  # when an image may be requested again
         self._left = BURST
         self._paid_us: int | None = None
         self._dropped = 0
+
+    @property
+    def watches(self) -> bool:
+        """Whether there is, or may be, a camera."""
+        return self.expected or bool(self._cameras)
 
     # ------------------------------------------------------------------------------------------ heard
 
@@ -328,7 +336,8 @@ class ImageObserver:
                 camera.due_us = now_us + (FIRST_US if unsettled else EACH_US) * self._slack
                 if camera.unanswered <= MOST_UNANSWERED:
                     yield self._question(system, camera)
-            if camera.answers and (camera.asked is None or now_us >= camera.until_us):
+            idle = camera.asked is None or now_us >= camera.until_us
+            if camera.answers and idle and now_us >= self._next_us:
                 yield from self._again(system, camera, now_us)
 
     def ask_all(self, system: int) -> Iterator[Message]:
@@ -357,7 +366,7 @@ class ImageObserver:
             camera.asked = gap[0]
         camera.tries += 1
         series.requests += 1
-        camera.until_us = now_us + ANSWER_US * self._slack
+        camera.until_us, self._next_us = now_us + ANSWER_US * self._slack, now_us + REQUEST_US
         yield messages.request_of(system, camera.component, CAPTURED, camera.asked)
 
     # ------------------------------------------------------------------------------------------ missing

@@ -190,8 +190,8 @@ class StatusText(Event, frozen=True):
 
 
 class ImageReported(Event, frozen=True):
-    """A camera reported a picture for the first time. `detail` is its record (`evidence.images`), untrusted. `camera`
-    is the MAVLink component, `index` None for a picture that failed.
+    """A camera reported a picture for the first time. `detail` is its record (`evidence.image_records`), untrusted.
+    `camera` is the MAVLink component, `index` None for a picture that failed.
     """
 
     camera: int

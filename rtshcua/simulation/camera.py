@@ -1,5 +1,5 @@
 """A simulated camera: pictures are effects of the simulated world, with the true place, attitude and time of the
-shutter. `components` and `ardupilot.payload_commands` report them by MAVLink.
+shutter. `payload_components` and `ardupilot.payload_commands` report them by MAVLink.
 """
 
 from collections.abc import Callable

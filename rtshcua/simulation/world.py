@@ -17,11 +17,11 @@ from rtshcua.simulation.answers import Inbox
 from rtshcua.simulation.ardupilot.flavour import ArduCopter
 from rtshcua.simulation.autopilot import TICK_US, Autopilot, Flavour, Taker
 from rtshcua.simulation.camera import Shot
-from rtshcua.simulation.components import components_of
 from rtshcua.simulation.config import Answers, AutopilotKind, SimulationConfig
 from rtshcua.simulation.face import Face
 from rtshcua.simulation.fault_effects import Affected, effects
 from rtshcua.simulation.link import FaultyLink
+from rtshcua.simulation.payload_components import components_of
 from rtshcua.simulation.px4.flavour import Px4
 
 FLAVOURS: Mapping[AutopilotKind, Flavour] = {AutopilotKind.PX4: Px4(), AutopilotKind.ARDUPILOT: ArduCopter()}
@@ -172,18 +172,24 @@ class Simulation:
             autopilot.tick()
             if autopilot.outbox or autopilot.now_us >= autopilot.streams.next_us:
                 down.send(face.due(), at_us)
-        if self._has_payload:
-            autopilot.step_payload(at_us)
-            for component in self._components:
-                component.due(at_us)
-                if not self._halted and not autopilot.off_us:
-                    down.send(component.taken(), at_us)
+        self._step_payload(at_us)
         if autopilot.taker is not None and self._taken_over_us is None:
             self._taken_over_us = at_us
         if at_us >= face.radio_due_us:
             down.send((face.radio(at_us),), at_us)
         for voice in autopilot.voices:
             down.send(voice.due(autopilot, self._system, at_us), at_us)
+
+    def _step_payload(self, at_us: int) -> None:
+        """Advance the camera and the gimbal. Their frames pass the autopilot, while it runs."""
+        if not self._has_payload:
+            return
+        autopilot = self._autopilot
+        autopilot.step_payload(at_us)
+        for component in self._components:
+            component.due(at_us)
+            if not self._halted and not autopilot.off_us:
+                self._down.send(component.taken(), at_us)
 
     def _halt(self, halted: bool) -> None:
         """Halt or resume the autopilot's loop, including its clock."""

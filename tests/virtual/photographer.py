@@ -8,7 +8,7 @@ import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.codec.frames import Codec
-from rtshcua.evidence.images import ImageDetail, MissingDetail
+from rtshcua.evidence.image_records import ImageDetail, MissingDetail
 from rtshcua.onboard.ports import Event
 from rtshcua.simulation.config import AutopilotKind
 from virtual.flight import Flight, Flown

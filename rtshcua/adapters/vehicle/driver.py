@@ -11,7 +11,7 @@ from rtshcua.adapters.vehicle import messages, observed, others, preflight
 from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.drain import Consumption
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
-from rtshcua.adapters.vehicle.images import OF_AUTOPILOT, OF_CAMERA, ImageObserver
+from rtshcua.adapters.vehicle.image_observer import OF_AUTOPILOT, OF_CAMERA, ImageObserver
 from rtshcua.adapters.vehicle.link import (
     NO_VEHICLE,
     SILENT,
@@ -362,12 +362,10 @@ class Driver:
             self._advance(now_us, send, events)
         if now_us >= self._aids.query.due_us:
             send += self._ask(now_us)
+        send += self._watch_images(now_us, events)
         if not self._was_ready:
             self._judge_readiness(now_us, events)
         self._tell_notes(now_us, events)
-        if self._lists_images_us is not None and now_us >= self._lists_images_us:
-            self._lists_images_us = None
-            events += self.images.expected_images(now_us)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         self._serve_payload(now_us, events)
@@ -412,8 +410,6 @@ class Driver:
             send.append(messages.request(self.system, "SYSTEM_TIME"))
         if now_us >= self.stream_requests.due_us:
             send += self.stream_requests.due(self.system, now_us)
-        triggers = self.flavour is ARDUPILOT
-        send += self._ask_images(self.images.due(self.system, now_us, triggers=triggers))
         if self._timed and not self._was_ready:
             send += self._ask_once(now_us)
         if self.asks_first is not None:
@@ -630,6 +626,15 @@ class Driver:
         if frame.name != "COMMAND_ACK" or self._is_for_us(frame.message):
             home_amsl = self.seen.home_amsl
             events += self.images.take(frame.name, frame.message, frame.component, now_us, home_amsl)
+
+    def _watch_images(self, now_us: int, events: list[Event]) -> list[Message]:
+        """Tell the expected images when they are due; return the requests about images that are."""
+        if not self.images.watches:
+            return []
+        if self._lists_images_us is not None and now_us >= self._lists_images_us:
+            self._lists_images_us = None
+            events += self.images.expected_images(now_us)
+        return self._ask_images(self.images.due(self.system, now_us, triggers=self.flavour is ARDUPILOT))
 
     def _ask_images(self, questions: Iterable[Message]) -> list[Message]:
         """Requests about images; the autopilot's answers to them are counted."""

@@ -32,8 +32,8 @@ from rtshcua.evidence.records import DecisionRecord, Effect, Genesis
 from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.flight.export import CSV, FORMATS, GEOJSON, GEOTAG, GPX, KML, MCAP, PLAN, SUFFIXES, TLOG
 from rtshcua.ground.flight.export.exported import ExportedRecord, FlightExport, with_usable_track
+from rtshcua.ground.flight.flight_images import FlightImage, FlightImages, NamedImage, images_of, named
 from rtshcua.ground.flight.flown import Flight, FlightTelemetry
-from rtshcua.ground.flight.images import FlightImage, FlightImages, NamedImage, images_of, named
 from rtshcua.ground.flight.track import home_of
 from rtshcua.wire.request import STEP
 

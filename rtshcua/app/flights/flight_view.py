@@ -14,7 +14,7 @@ from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import many, seconds, true_to, utc
 from rtshcua.decision.tree import AtMost, Both, CodeScope, Either, Negation, Node, parse, scope_of
 from rtshcua.evidence.finding import Claim
-from rtshcua.evidence.images import MOST_GAPS
+from rtshcua.evidence.image_records import MOST_GAPS
 from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.records import Close, Effect
 from rtshcua.evidence.report import LogReport
@@ -28,8 +28,8 @@ from rtshcua.ground.flight.flight_content import (
     SignalLimit,
     TrackView,
 )
+from rtshcua.ground.flight.flight_images import FlightImages, images_of
 from rtshcua.ground.flight.flown import Flight
-from rtshcua.ground.flight.images import FlightImages, images_of
 from rtshcua.ground.flight.track import distance, home_of, place_at
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Invocation

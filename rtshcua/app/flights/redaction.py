@@ -24,7 +24,7 @@ from rtshcua.app.flights.left_over import HEX, LeftOver, ordinary_words, shape, 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.finding import Claim
-from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, encoded, read_image, read_missing
+from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, encoded, read_image, read_missing
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Recover, Seal
 from rtshcua.evidence.report import LogReport

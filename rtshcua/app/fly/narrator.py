@@ -23,7 +23,7 @@ from rtshcua.app.fly.story import (
 )
 from rtshcua.app.fly.view_ports import LiveView
 from rtshcua.decision.outline import rings
-from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, read_image, read_missing
+from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, read_image, read_missing
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind

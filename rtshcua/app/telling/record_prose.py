@@ -13,7 +13,7 @@ from rtshcua.app.telling.people import NOBODY, People
 from rtshcua.app.wording import many
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.gaps import STALLED
-from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, read_image, read_missing
+from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, read_image, read_missing
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.evidence.note import octets, parse, read_signature, split
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal

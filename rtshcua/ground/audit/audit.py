@@ -10,7 +10,7 @@
     (`documents`)
 14. evidence before effect: each dispatch follows a record that permits it, in the right order (`dispatches`); not in
     mode `none`
-15. images: none is recorded twice, and the lists of missing ones agree with the records (`rtshcua.evidence.images`)
+15. images: none is recorded twice, and the lists of missing ones agree with the records (`evidence.image_records`)
 
 Of several flaws, the first of these is reported: genesis and trust, the log itself, anchors, the boundary's own
 evidence, the meaning of the records. A log that is not intact proves nothing, so its own flaws come before those of its
@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from rtshcua.evidence.attested import BoundaryEvidence
 from rtshcua.evidence.finding import Claim, Finding, Flaw
-from rtshcua.evidence.images import ImageLedger
+from rtshcua.evidence.image_records import ImageLedger
 from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.records import AnyRecord, DecisionRecord, Effect, Genesis, Recover
 from rtshcua.evidence.report import LogReport, claims, with_anchors, with_boundary
@@ -153,11 +153,16 @@ class Auditor:
             self._contradicted = flaw.at(record.seq, verifier.offset - len(line))
         if self._unattested is None and self._boundary is not None and not isinstance(record, Genesis):
             self._unattested = self._attested(self._boundary, record, verifier.offset - len(line))
-        if self._suspect is None and self._meaning is not None and (flaw := self._meaning.check(record)):
-            self._suspect = flaw.at(record.seq, verifier.offset - len(line))
-        if self._suspect is None and isinstance(record, Effect | Recover) and (flaw := self._images.check(record)):
+        if self._suspect is None and (flaw := self._meant(record)):
             self._suspect = flaw.at(record.seq, verifier.offset - len(line))
         return True
+
+    def _meant(self, record: AnyRecord) -> Flaw | None:
+        """The flaw in the meaning of a record, or in what it says of images."""
+        flaw = None if self._meaning is None else self._meaning.check(record)
+        if flaw is None and isinstance(record, Effect | Recover):
+            flaw = self._images.check(record)
+        return flaw
 
     def _begin(self, genesis: Genesis) -> Flaw | None:
         basis = establish(genesis, self._pinned, bundle=self._expected)

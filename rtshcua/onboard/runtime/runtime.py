@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, ImageLedger, MissingDetail, encoded
+from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, ImageLedger, MissingDetail, encoded
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.witnessing.anchors import ANCHORED
 from rtshcua.model.flat.situation import Now

@@ -17,7 +17,9 @@ from rtshcua.simulation.autopilot import Autopilot, Builder, Handler
 from rtshcua.simulation.camera import SimulatedCamera
 from rtshcua.simulation.command import VehicleCommand, whole
 from rtshcua.simulation.commands import ACCEPTED, FAILED, UNSUPPORTED
-from rtshcua.simulation.components import (
+from rtshcua.simulation.gimbal import SimulatedGimbal
+from rtshcua.simulation.mission_protocol import AMSL_FRAMES
+from rtshcua.simulation.payload_components import (
     camera_information,
     camera_settings,
     capture_status,
@@ -27,8 +29,6 @@ from rtshcua.simulation.components import (
     manager_status,
     pitch_and_yaw,
 )
-from rtshcua.simulation.gimbal import SimulatedGimbal
-from rtshcua.simulation.mission_protocol import AMSL_FRAMES
 from rtshcua.simulation.place import Point
 
 _GIMBAL = 1

@@ -206,7 +206,7 @@ _PAYLOAD: Mapping[int, Handler] = {
     mavlink.MAV_CMD_DO_GRIPPER: _grip,
 }  # fmt: skip
 """Commands for payloads, as recorded; those that are missing here are unsupported. A camera and a gimbal are
-components of their own (`simulation.components`), and change nothing of these answers.
+components of their own (`simulation.payload_components`), and change nothing of these answers.
 """
 _SHARED = shared(mode=TEMPORARILY_REJECTED, stream=FAILED, says_why=False, message=DENIED, needs_one=True)
 COMMANDS: Mapping[int, Handler] = _SHARED | {

@@ -47,8 +47,8 @@ SHOT = payload_case.emission(2000)
 
 def test_contracts_and_vehicles_with_payload_have_all_fields() -> None:
     contract, vehicle = THE_POLICY.contracts[0], THE_POLICY.vehicle
-    assert builtins_of(replace(contract, emits=(SHOT,)))[16] == [builtins_of(SHOT)]
-    assert builtins_of(replace(vehicle, servos=(9, 10)))[23] == [9, 10]
+    assert builtins_of(replace(contract, emits=(SHOT,)))[16] == (builtins_of(SHOT),)
+    assert builtins_of(replace(vehicle, servos=(9, 10)))[23] == (9, 10)
 
 
 def with_plan(*fields: Any) -> bytes:

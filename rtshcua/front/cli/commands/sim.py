@@ -95,11 +95,8 @@ def sim(
         if isinstance(link := address_of(connect, ways=(LinkCarrier.UDP_OUT,)), ExitCode):
             return link
         if not link.is_loopback:
-            return fail(
-                ExitCode.USAGE,
-                f"`{connect}` is not on this machine",
-                "the simulated vehicle accepts only `udpout:127.0.0.1:PORT`",
-            )
+            help = "the simulated vehicle accepts only `udpout:127.0.0.1:PORT`"
+            return fail(ExitCode.USAGE, f"`{connect}` is not on this machine", help)
         port = link.port
     port = port or PORT
     words = simulated.simulator_words(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
@@ -110,8 +107,7 @@ def sim(
             return unread
         words.append(f"--signing-key={signing_key}")
     words += [f"--parameter={each}" for each in parameter or ()]
-    words += [*(["--usb"] if usb else []), *(["--stock"] if stock else [])]
-    words += [*(["--camera"] if camera else []), *(["--gimbal"] if gimbal else [])]
+    words += _flags(usb=usb, stock=stock, camera=camera, gimbal=gimbal)
     words += [f"--release={release}"] if release is not None else []
     words += [f"--boot={boot}", f"--answers={answers}", f"--estimate={estimate}"]
     try:
@@ -128,6 +124,10 @@ def sim(
         except KeyboardInterrupt:
             return ExitCode.OK
     return fail(ExitCode.FAULT, f"the simulated vehicle ended unexpectedly with code {code}")
+
+
+def _flags(**given: bool) -> list[str]:
+    return [f"--{name}" for name, on in given.items() if on]
 
 
 def _unread(path: Path) -> ExitCode | None:

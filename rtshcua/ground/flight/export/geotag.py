@@ -17,7 +17,7 @@ from rtshcua.ground.flight.export.exported import (
     decimal,
     utc_text,
 )
-from rtshcua.ground.flight.images import FlightImage, NamedImage
+from rtshcua.ground.flight.flight_images import FlightImage, NamedImage
 
 DATUM: Final = "above mean sea level as the camera reported it"
 #: longitude before latitude, as the columns x and y

@@ -16,7 +16,7 @@ from rtshcua.app.fly.story import Summary
 from rtshcua.app.telling.record_prose import Names, detail_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.images import ImageDetail, MissingDetail, encoded
+from rtshcua.evidence.image_records import ImageDetail, MissingDetail, encoded
 from rtshcua.evidence.reading import read
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.render.live.lines import ending

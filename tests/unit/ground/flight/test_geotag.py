@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import pytest
 
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.images import ImageDetail
+from rtshcua.evidence.image_records import ImageDetail
 from rtshcua.ground.flight.export.geotag import exif_arguments, geo_txt, nadir_angles
-from rtshcua.ground.flight.images import FlightImage, NamedImage, named, natural
+from rtshcua.ground.flight.flight_images import FlightImage, NamedImage, named, natural
 
 UTC, S = 1_700_000_000_000_000, 1_000_000
 

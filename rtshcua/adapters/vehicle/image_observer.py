@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
-from rtshcua.evidence.images import ImageDetail, IndexSet, encoded
+from rtshcua.evidence.image_records import ImageDetail, IndexSet, encoded
 from rtshcua.mavlink.enums import MAV_CMD_REQUEST_MESSAGE
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.quantise import quantise
@@ -46,6 +46,8 @@ EARNED_US: Final = 50_000
 TRIES: Final = 3
 MOST_REQUESTS: Final = 2_000
 ANSWER_US: Final = 700_000
+#: how often an image of any camera is requested
+REQUEST_US: Final = 200_000
 #: how often a camera is asked how many images it has taken, and at first
 EACH_US: Final = 5_000_000
 FIRST_US: Final = 1_000_000
@@ -112,9 +114,15 @@ class ImageObserver:
         #: the mission takes pictures: ask an autopilot for the state of its camera before the flight
         self.expected = False
         self._accuracy: tuple[int, int | None, int | None] | None = None
+        self._next_us = 0  # when an image may be requested again
         self._left = BURST
         self._paid_us: int | None = None
         self._dropped = 0
+
+    @property
+    def watches(self) -> bool:
+        """Whether there is, or may be, a camera."""
+        return self.expected or bool(self._cameras)
 
     # ------------------------------------------------------------------------------------------ heard
 
@@ -208,14 +216,9 @@ class ImageObserver:
             return []
         if not self._pays(now_us):
             return []
-        if index <= (series.seen.highest or -1):
-            if message.completed_captures > camera.completed:  # triggers were faster than the shutter's feedback
-                late = list(series.seen.gaps(series.first or 0, index))
-                index = late[-1][1] if late else None
-            else:
-                series = self._restart(camera, 1)
-        camera.completed = message.completed_captures
-        if index is None:
+        index = self._told_index(camera, index, message.completed_captures)
+        series, camera.completed = camera.series, message.completed_captures
+        if index is None or camera.deaf:
             return []
         self._see(series, index, (0, utc_us))
         latitude, longitude = _place(message.lat, message.lng)
@@ -228,6 +231,19 @@ class ImageObserver:
             yaw_cd=_centidegrees(message.yaw), **self._accurate(now_us),
         )  # fmt: skip
         return [ImageReported(now_us, component, index, encoded(detail))]
+
+    def _told_index(self, camera: _Camera, index: int, completed: int) -> int | None:
+        """The index of a new picture by CAMERA_FEEDBACK; None if it cannot be told. An index that is not above all
+        before means a restart, or that triggers were faster than the shutter's feedback.
+        """
+        series = camera.series
+        if index > (series.seen.highest or -1):
+            return index
+        if completed <= camera.completed:
+            self._restart(camera, 1)
+            return index
+        late = list(series.seen.gaps(series.first or 0, index))
+        return late[-1][1] if late else None
 
     def _count(self, camera: _Camera, index: int, utc_us: int | None) -> None:
         """Follow ArduPilot's count of triggers, which is ahead of the pictures. Without any picture since its start it
@@ -242,28 +258,21 @@ class ImageObserver:
 
     def _is_new(self, camera: _Camera, index: int | None, made: _Time) -> bool:
         """Take in an image; return whether it is a new one, not one that was reported before."""
-        boot_ms, utc_us = made
         series = camera.series
         if index is None:
-            if made in series.failures:
+            return _fails(series, made)
+        newer = made[1] > series.newest_us > 0
+        if index in series.seen:
+            if _is_known(series, index, made, newer=newer):
                 return False
-            series.failures[made] = None
-            series.failed += 1
-            _bound(series.failures)
-            return True
-        again = index in series.seen
-        if again and series.known.get(index) == made:
-            return False
-        newer = utc_us > series.newest_us and series.newest_us > 0
-        if again and not newer and (utc_us or index not in series.known):
-            return False
-        if again or (newer and index < (series.seen.highest or 0)) or (newer and index < (series.first or 0)):
             series = self._restart(camera, 0)
-            if camera.deaf:
-                return False
+        elif newer and index < max(series.seen.highest or 0, series.first or 0):
+            series = self._restart(camera, 0)
         elif series.first is not None and index < series.first:
             return False  # from before, requested by somebody else
-        camera.boot_ms = max(camera.boot_ms, boot_ms)
+        if camera.deaf:
+            return False
+        camera.boot_ms = max(camera.boot_ms, made[0])
         if camera.asked == index:
             camera.asked, camera.tries = None, 0
         self._see(series, index, made)
@@ -328,7 +337,8 @@ class ImageObserver:
                 camera.due_us = now_us + (FIRST_US if unsettled else EACH_US) * self._slack
                 if camera.unanswered <= MOST_UNANSWERED:
                     yield self._question(system, camera)
-            if camera.answers and (camera.asked is None or now_us >= camera.until_us):
+            idle = camera.asked is None or now_us >= camera.until_us
+            if camera.answers and idle and now_us >= self._next_us:
                 yield from self._again(system, camera, now_us)
 
     def ask_all(self, system: int) -> Iterator[Message]:
@@ -357,7 +367,7 @@ class ImageObserver:
             camera.asked = gap[0]
         camera.tries += 1
         series.requests += 1
-        camera.until_us = now_us + ANSWER_US * self._slack
+        camera.until_us, self._next_us = now_us + ANSWER_US * self._slack, now_us + REQUEST_US
         yield messages.request_of(system, camera.component, CAPTURED, camera.asked)
 
     # ------------------------------------------------------------------------------------------ missing
@@ -370,6 +380,22 @@ class ImageObserver:
             for component, series in found
             if series.first is not None
         ]
+
+
+def _fails(series: _Series, made: _Time) -> bool:
+    """Count a picture that failed; return whether it was not reported before."""
+    if made in series.failures:
+        return False
+    series.failures[made] = None
+    series.failed += 1
+    _bound(series.failures)
+    return True
+
+
+def _is_known(series: _Series, index: int, made: _Time, *, newer: bool) -> bool:
+    """Whether an index that was seen before is of the same image, and not of one after a restart."""
+    known = series.known.get(index)
+    return known == made or (not newer and (made[1] > 0 or known is None))
 
 
 def _bound(known: OrderedDict[Any, Any]) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference.independent_images import Contradicted, Images
-from rtshcua.evidence.images import (
+from rtshcua.evidence.image_records import (
     IMAGE,
     IMAGES_MISSING,
     MOST_GAPS,

@@ -10,9 +10,9 @@ import msgspec
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from rtshcua.adapters.vehicle import images
-from rtshcua.adapters.vehicle.images import ImageObserver
-from rtshcua.evidence.images import ImageDetail, ImageLedger, read_image
+from rtshcua.adapters.vehicle import image_observer as images
+from rtshcua.adapters.vehicle.image_observer import ImageObserver
+from rtshcua.evidence.image_records import ImageDetail, ImageLedger, read_image
 from rtshcua.onboard.ports import ImageReported, ImagesExpected
 
 S, UTC = 1_000_000, 1_700_000_000_000_000

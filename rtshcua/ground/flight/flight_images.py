@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.images import IMAGE, IMAGES_MISSING, ImageDetail, MissingDetail, read_image, read_missing
+from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, ImageDetail, MissingDetail, read_image, read_missing
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.flight.flown import Flight
 
@@ -87,23 +87,21 @@ def named(
     place in the order, if there are as many; else to that of the same time, if only one offset between the clocks fits.
     """
     told = [each.detail.file for each in images]
-    whole = all(told) and len(set(told)) == len(told)
+    unique = all(told) and len(set(told)) == len(told)
+    if unique and (files is None or not set(told).isdisjoint(files)):
+        kept = [each for each in images if files is None or each.detail.file in files]
+        return _checked([(each.detail.file, each) for each in kept], "by their recorded names")
     if files is None:
-        return _checked(images, told, "by their recorded names") if whole else _UNNAMED
-    present = sorted(files, key=natural)
-    if whole and set(told) & set(present):
-        kept = [each for each in images if each.detail.file in set(present)]
-        return _checked(kept, [each.detail.file for each in kept], "by their recorded names")
+        return _UNNAMED
     if len({each.detail.camera for each in images}) > 1:
-        return Refusal(
-            "no-match", "the log has images of several cameras, without their file names", _ADD, ExitCode.INPUT
-        )
+        text = "the log has images of several cameras, without their file names"
+        return Refusal("no-match", text, _ADD, ExitCode.INPUT)
+    present = sorted(files, key=natural)
     if len(present) == len(images):
-        return _checked(images, present, "by their order")
-    dated = {name: times_us[name] for name in present if name in times_us}
-    matched = _by_time(images, dated) if len(dated) == len(present) else None
+        return _checked(list(zip(present, images, strict=True)), "by their order")
+    matched = _by_time(images, present, times_us)
     if matched is not None:
-        return _checked([image for _, image in matched], [name for name, _ in matched], "by their times")
+        return _checked(matched, "by their times")
     count = f"the folder has {_many(present)} and the log {_many(images)}"
     return Refusal("no-match", f"{count}, and neither names nor times tell which belong together", _ADD, ExitCode.INPUT)
 
@@ -121,29 +119,23 @@ _UNNAMED: Final = Refusal(
 _ADD: Final = "copy all images of the flight into the folder, and no others"
 
 
-def _checked(
-    images: Sequence[FlightImage], names: Sequence[str], how: str
-) -> tuple[tuple[NamedImage, ...], str] | Refusal:
-    odd = next((each for each in names if not _PLAIN.fullmatch(each)), None)
+def _checked(pairs: Sequence[tuple[str, FlightImage]], how: str) -> tuple[tuple[NamedImage, ...], str] | Refusal:
+    odd = next((name for name, _ in pairs if not _PLAIN.fullmatch(name)), None)
     if odd is not None:
-        return Refusal(
-            "odd-name",
-            f"`{odd}` has a space, or begins with `#`: readers would misread it",
-            "rename it",
-            ExitCode.INPUT,
-        )
-    return tuple(NamedImage(name, image) for name, image in zip(names, images, strict=True)), how
+        text = f"`{odd}` has a space, or begins with `#`: readers would misread it"
+        return Refusal("odd-name", text, "rename it", ExitCode.INPUT)
+    return tuple(NamedImage(name, image) for name, image in pairs), how
 
 
 def _by_time(
-    images: Sequence[FlightImage], times_us: Mapping[str, int]
+    images: Sequence[FlightImage], present: Sequence[str], times_us: Mapping[str, int]
 ) -> list[tuple[str, FlightImage]] | None:  # fmt: skip
     """Match by time, with one unknown offset between the clocks; None if none fits, or several do."""
     dated = sorted((each for each in images if each.detail.utc_us), key=lambda each: each.detail.utc_us or 0)
-    files = sorted(times_us, key=lambda name: (times_us[name], natural(name)))
-    if not dated or not files:
+    if not dated or not present or not set(present) <= set(times_us):
         return None
-    within_us = FRACTION_US if any(each % WHOLE_US for each in times_us.values()) else WHOLE_US
+    files = sorted(present, key=lambda name: (times_us[name], natural(name)))
+    within_us = FRACTION_US if any(times_us[name] % WHOLE_US for name in files) else WHOLE_US
     best = dict[int, list[tuple[str, FlightImage]]]()
     for image in dated:
         offset = times_us[files[0]] - (image.detail.utc_us or 0)

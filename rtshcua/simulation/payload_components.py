@@ -107,7 +107,7 @@ def pitch_and_yaw(gimbal: SimulatedGimbal, parameters: Parameters) -> None:
     gimbal.point(*(radians(each) if isfinite(each) else nan for each in parameters[:4]), locked=bool(flags & earth))
 
 
-class Component:
+class PayloadComponent:
     """One component: its heartbeat, streams and commands. Its clock begins with the simulation."""
 
     #: the type in its HEARTBEAT (MAV_TYPE)
@@ -197,7 +197,7 @@ class Component:
         return ACCEPTED
 
 
-class CameraComponent(Component):
+class CameraComponent(PayloadComponent):
     """The camera, component 100."""
 
     kind = mavlink.MAV_TYPE_CAMERA
@@ -307,7 +307,7 @@ class CameraComponent(Component):
         )  # fmt: skip
 
 
-class GimbalComponent(Component):
+class GimbalComponent(PayloadComponent):
     """The gimbal, component 154, which is its own gimbal manager."""
 
     kind = mavlink.MAV_TYPE_GIMBAL
@@ -365,9 +365,9 @@ class GimbalComponent(Component):
         return ACCEPTED
 
 
-def components_of(autopilot: Autopilot, system: int) -> tuple[Component, ...]:
+def components_of(autopilot: Autopilot, system: int) -> tuple[PayloadComponent, ...]:
     """Return the components of a vehicle whose autopilot does not speak for its camera and gimbal."""
-    found: list[Component] = []
+    found: list[PayloadComponent] = []
     if not autopilot.flavour.speaks_for_payload:
         if autopilot.camera is not None:
             found.append(CameraComponent(autopilot, system, autopilot.camera))

@@ -185,10 +185,13 @@ class FlightMark(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FlownWay:
-    """A flown track in parts, which gaps of the telemetry separate, and marks along it."""
+    """A flown track in parts, which gaps of the telemetry separate, and marks along it. The parts that are `later` came
+    after the last record of the log.
+    """
 
     parts: tuple[tuple[FlownPlace, ...], ...]
     marks: tuple[FlightMark, ...] = ()
+    later: tuple[tuple[FlownPlace, ...], ...] = ()
 
 
 def planned_legs(way: PlannedWay, site: Site) -> Iterator[PlannedLeg]:

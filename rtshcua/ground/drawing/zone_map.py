@@ -210,7 +210,7 @@ class DrawnBand(NamedTuple):
 class ZoneMap:
     """A map; `bar` is the length of the scale bar in px, and what that is. `margin` is the band of the position error
     around the way, `stopping` where the vehicle would stop beyond the ends of its legs, and `homeward` the ways home.
-    `ways`, `failed` and `flown` are the points of lines.
+    `ways`, `failed`, `flown` and `later` are the points of lines.
     """
 
     title: str
@@ -227,6 +227,7 @@ class ZoneMap:
     ways: tuple[str, ...]
     failed: tuple[str, ...]
     flown: tuple[str, ...]
+    later: tuple[str, ...]
     stops: tuple[tuple[float, float], ...]
     marks: tuple[DrawnMark, ...]
     labels: tuple[MapLabel, ...]
@@ -267,7 +268,7 @@ def mission_map(
     places = [site.home, *(place for leg in legs for place in (leg.begin[:2], leg.end[:2]))]
     places += [place for line in _stopping(site, legs) for place in line]
     if flown is not None:
-        places += [(each.x, each.y) for part in flown.parts for each in part]
+        places += [(each.x, each.y) for part in (*flown.parts, *flown.later) for each in part]
         places += [(each.x, each.y) for each in flown.marks]
     error = site.margins.position_error
     extent = extent_of_places(places)
@@ -347,6 +348,7 @@ def _map(
         ways=drawn.ways,
         failed=drawn.failed,
         flown=drawn.flown,
+        later=drawn.later,
         stops=tuple(drawn.stops),
         marks=drawn.marks,
         labels=tuple(labels.placed),
@@ -385,6 +387,7 @@ class _DrawnWay(NamedTuple):
     ways: tuple[str, ...] = ()
     failed: tuple[str, ...] = ()
     flown: tuple[str, ...] = ()
+    later: tuple[str, ...] = ()
     stops: Mapping[tuple[float, float], Sequence[int]] = MappingProxyType({})
     marks: tuple[DrawnMark, ...] = ()
     lines: tuple[Sequence[tuple[float, float]], ...] = ()
@@ -398,7 +401,8 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
     homeward = [(on.at(*place), home) for place in _homeward(site, legs)]
     stopping = [(on.at(*begin), on.at(*end)) for begin, end in _stopping(site, legs)]
     width = max(2 * site.margins.position_error * on.scale, LEAST_BAND)
-    tracks = () if flown is None else tuple([on.at(each.x, each.y) for each in part] for part in flown.parts)
+    drawn = ((), ()) if flown is None else (flown.parts, flown.later)
+    tracks, later = ([[on.at(each.x, each.y) for each in part] for part in some] for some in drawn)
     marks = [] if flown is None else [DrawnMark(*on.at(each.x, each.y), each.kind, each.label) for each in flown.marks]
     marks += [
         DrawnMark(*on.at(each.x, each.y), "left", f"step {each.number} leaves the airspace") for each in refused.left
@@ -411,9 +415,10 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
         ways=(points(line),),
         failed=tuple(map(points, failed)),
         flown=tuple(map(points, tracks)),
+        later=tuple(map(points, later)),
         stops=_stops(on, shown.way, site),
         marks=tuple(marks),
-        lines=(line, *homeward, *(_thinned_line(each) for each in tracks)),
+        lines=(line, *homeward, *(_thinned_line(each) for each in (*tracks, *later))),
     )
     return way._replace(keys=tuple(_way_keys(site, way)))
 
@@ -435,6 +440,8 @@ def _way_keys(site: Site, way: _DrawnWay) -> Iterator[DrawingKey]:
         yield DrawingKey("failed-mark", "where it leaves the airspace first")
     if way.flown:
         yield DrawingKey("flown", "the flown track")
+    if way.later:
+        yield DrawingKey("later", "the track after the last record of the log")
     if kinds & EVENTS:
         yield DrawingKey("event-mark", "a decision, with the number of its record")
 

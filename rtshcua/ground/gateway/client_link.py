@@ -15,7 +15,7 @@ TEXT_EVERY_US: Final = 5_000_000
 _MOST_CHUNKS: Final = 4
 _MOST_KEYS: Final = 64
 #: what a client can cause as often as it likes; everything else is recorded at any rate
-_OFTEN: Final = frozenset({"refused", "absorbed", "passed"})
+_OFTEN: Final = frozenset({"refused", "withdrawn", "absorbed", "passed"})
 #: how many records at once, and the interval after that, us
 _RECORDS: Final = 20
 _RECORD_EVERY_US: Final = 200_000

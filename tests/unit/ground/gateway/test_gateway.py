@@ -24,6 +24,7 @@ from rtshcua.ground.gateway.interface import (
     ClientNote,
     FlightEnded,
     FromClient,
+    FromPilot,
     FromVehicle,
     ProposalAnswered,
     ProposalChecked,
@@ -440,6 +441,15 @@ def test_a_pilots_request_for_another_vehicle_gives_no_control_here() -> None:
         assert [each["effect"] for each in records(actions)] == ["passed"]
         assert controls(actions) == []
         assert acks(actions, 9) == []
+
+
+def test_a_pilots_command_cancel_is_recorded_and_gives_no_control() -> None:
+    world = GatewayWorld()
+    world.client(9, "tower", pilot=True)
+    values = {"command": 32_100, "target_system": 1, "target_component": 1}
+    actions = world.take(FromPilot(9, made(layouts.COMMAND_CANCEL, values, (250, 1), 0)))
+    assert [(each["effect"], each["command"]) for each in records(actions)] == [("passed", 32_100)]
+    assert (acks(actions, 9), controls(actions)) == ([], [])
 
 
 @pytest.mark.parametrize("message", [DISARMS, *SAFE])

@@ -409,6 +409,8 @@ def _keys(site: Site, drawn: _DrawnHeights, bands: Sequence[ZoneBand]) -> Iterat
         yield DrawingKey("failed-mark", "where it leaves the airspace first")
     if drawn.flown:
         yield DrawingKey("flown", "the flown heights")
+    if drawn.later:
+        yield DrawingKey("later", "the heights after the last record of the log")
     if EVENTS & {mark.kind for mark in drawn.marks}:
         yield DrawingKey("event-mark", "a decision, with the number of its record")
     if site.return_altitude:

@@ -178,6 +178,7 @@ def test_telemetry_after_the_last_record_is_drawn_apart(completed: Path, tmp_pat
     whole, cut = page(report_of(completed).report), page(report_of(tmp_path).report)
     for drawn in ('"flown later"', '"line later"', "swatch later"):
         assert (drawn in whole, drawn in cut) == (False, True)
+    assert cut.count("swatch later") == 2, "keys of the map and of the heights"
     spans = [re.findall(r'data-span="[0-9.]+ [0-9.]+ -?[0-9]+ ([0-9]+)"', text) for text in (whole, cut)]
     assert all(abs(int(one) - int(other)) < 1_000 for one, other in zip(*spans, strict=True)), "the axis has all of it"
 

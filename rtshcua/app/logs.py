@@ -44,6 +44,23 @@ def logs_meant(given: Iterable[Path]) -> list[Path]:
     return [log for path in given for log in logs_of(path) or [path / LOG]]
 
 
+def logs_or_unread(given: Iterable[Path]) -> list[Path]:
+    """As `logs_meant`; a file or folder that cannot be read stands for itself, so that opening it tells why."""
+    return [log for path in given for log in _found_or_unread(path) or [path / LOG]]
+
+
+def _found_or_unread(path: Path) -> list[Path]:
+    try:
+        return logs_of(path)
+    except OSError:
+        pass
+    try:  # something in it cannot be read, or the folder itself
+        below = sorted(each for each in path.iterdir() if each.is_dir() and not each.is_symlink())
+    except OSError:
+        return [path]
+    return [log for each in below for log in _found_or_unread(each)] or [path]
+
+
 def logs_and_others(given: Iterable[Path]) -> tuple[list[Path], list[Path]]:
     """All logs at the paths and below folders, by content, and the other files with a log's suffix. An unreadable file
     counts as a log, so that opening it reports the error.

@@ -63,14 +63,12 @@ class CollectedFlight:
         return path is not None and self._reading is not None and self._reading.follow(path)
 
     def flight(self, *, growing: bool = False) -> Flight | Refusal:
-        """The flight so far. The telemetry ends with the log, except of a `growing` log, whose next record is still to
-        come.
-        """
+        """The flight so far. The next record of a `growing` log is still to come: nothing counts as later."""
         if self._reading is None:
             return self.records.flight(self.log, None)
         lasted_us = self.records.times.lasted_us
         heard = self._reading.telemetry(lasted_us)
-        return self.records.flight(self.log, heard if growing else heard.until(lasted_us))
+        return self.records.flight(self.log, heard._replace(later_us=0) if growing else heard)
 
     @property
     def persons(self) -> tuple[str, ...]:

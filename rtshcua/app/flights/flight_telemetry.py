@@ -275,7 +275,7 @@ class TelemetryReading:
         return FlightTelemetry(
             told.reports, track, told.home(), signals, _in_order(told.texts, span), _silences(runs, span, lasted_us),
             _in_order(told.boot, span), self._damaged, tuple(each.system for each in candidates[1:] and candidates),
-            steps, len(told.track) - len(track), _ended(runs, span),
+            steps, len(told.track) - len(track), 0 if lasted_us is None else max(_ended(runs, span) - lasted_us, 0),
         )  # fmt: skip
 
     def _candidates(self) -> list[_Vehicle]:

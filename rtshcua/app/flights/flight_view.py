@@ -2,6 +2,7 @@
 telemetry.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 
 from rtshcua import __version__
@@ -9,7 +10,7 @@ from rtshcua.app.autopilot_bindings import agreed, apart, described
 from rtshcua.app.flights.collected_flight import CollectedFlight
 from rtshcua.app.flights.flight_summary import FlightSummary
 from rtshcua.app.flights.flight_timeline import timeline
-from rtshcua.app.flights.telemetry_prose import doubts, silences
+from rtshcua.app.flights.telemetry_prose import doubts, goes_on, silences
 from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.wording import many, seconds, true_to, utc
 from rtshcua.decision.tree import AtMost, Both, CodeScope, Either, Negation, Node, parse, scope_of
@@ -47,7 +48,8 @@ def flight_view(
     """
     genesis, ending = flight.genesis, _ending(flight, report)
     track = _track(flight)
-    summary = FlightSummary(report, flight, collected, track, ending=ending, made_at_us=made_at_us, details=details)
+    counted = None if track is None else _until(track, flight)
+    summary = FlightSummary(report, flight, collected, counted, ending=ending, made_at_us=made_at_us, details=details)
     images = images_of(flight)
     assert collected.names is not None
     return FlightReport(
@@ -59,11 +61,12 @@ def flight_view(
         begun=utc(genesis.utc_us),
         begun_utc_us=genesis.utc_us,
         lasted_us=flight.lasted_us,
+        log_ends_us=_log_ends_us(flight),
         ending=ending,
         steps_done=len(summary.done),
         steps=len(flight.mission.invocations),
-        highest=None if track is None else max(each.above_home for each in track.points),
-        distance=None if track is None else distance(track.points, track.places),
+        highest=None if counted is None else max(each.above_home for each in counted.points),
+        distance=None if counted is None else distance(counted.points, counted.places),
         verdict=_verdict(report, ending),
         pinned=pinned,
         origin=origin_of(genesis.vehicle, genesis.boot),
@@ -143,6 +146,20 @@ def _gaps_of_images(images: FlightImages) -> Iterator[GapView]:
         yield GapView("images", f"{many(len(images.failed), 'picture')} failed, as the camera reported")
 
 
+def _log_ends_us(flight: Flight) -> int | None:
+    """The time of the last record; None if the telemetry does not go on after it."""
+    return flight.lasted_us if flight.telemetry is not None and goes_on(flight.telemetry) else None
+
+
+def _until(track: TrackView, flight: Flight) -> TrackView | None:
+    """The track up to the last record of the log, which is counted; None if it has no point there."""
+    log_ends_us = _log_ends_us(flight)
+    if log_ends_us is None:
+        return track
+    end = bisect_right(track.points, log_ends_us, key=lambda each: each.t_us)
+    return TrackView(track.points[:end], track.places[:end]) if end else None
+
+
 def _where(flight: Flight, track: TrackView | None, t_us: int) -> tuple[int, int] | None:
     """Where the vehicle was; None where no report tells."""
     known = None if track is None else place_at(track.points, t_us)
@@ -182,7 +199,7 @@ def _gaps_of_telemetry(flight: Flight) -> Iterator[GapView]:
         return
     if telemetry.damaged is not None:
         yield GapView("telemetry", f"the file breaks off at octet {telemetry.damaged}")
-    yield from (GapView("telemetry", each) for each in doubts(telemetry))
+    yield from (GapView("telemetry", each) for each in doubts(telemetry, drawn=True))
     yield from (GapView("frames", each) for each in silences(telemetry, flight.lasted_us))
     silent = [each.name for each in telemetry.signals if all(value is None for _, value in each.points)]
     if silent:

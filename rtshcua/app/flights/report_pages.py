@@ -135,7 +135,7 @@ def _name(log: Path, number: int, *, redacted: bool) -> str:
     """The name of a page: that of the run folder, or of the log; of a redacted page only a number."""
     if redacted:
         return f"flight-{number}"
-    folder = log.resolve().parent.name
+    folder = Path(os.path.realpath(log)).parent.name  # also of a link that leads to itself
     name = folder if log.name == "log.jsonl" and folder else log.stem
     return os.fsencode(name).decode("utf-8", "replace")
 

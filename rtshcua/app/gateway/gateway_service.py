@@ -37,7 +37,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.gateway import interface
 from rtshcua.ground.gateway.accepted import accepted_commands
-from rtshcua.ground.gateway.client_link import without_vehicle
+from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.interface import ClientSettings, Event, GatewaySettings
 from rtshcua.ground.gateway.translator import Gateway
 from rtshcua.mavlink import dialect
@@ -250,6 +250,8 @@ class GatewayService:
         self._frames: VehicleFrames | None = None
         self._heard: tuple[int, int] | None = None  # system and autopilot of the vehicle's heartbeat
         self._clients: dict[int, ClientSettings] = {}
+        self._early: dict[int, ClientLink] = {}  # the clients that sent something before the vehicle was heard
+        self._early_actions: list[interface.Action] = []
         self._session: GatewaySession | None = None
         self._failed, self._next_s, self._relays, self._flown = 0, 0.0, 0, 0
         self._numbers = 0
@@ -423,6 +425,7 @@ class GatewayService:
             self._carry_out(self._core.renew(settings, now), now)
             return
         self._core = Gateway(settings)
+        self._early.clear()
         for number, client in self._clients.items():
             self._take(interface.ClientUp(number, client), now)
         if self._session is not None and self._session.hello:
@@ -440,6 +443,7 @@ class GatewayService:
                 self._take(interface.ClientUp(client, self._clients[client]), now)
             case RelayKind.DOWN:
                 gone = self._clients.pop(client, None)
+                self._early.pop(client, None)
                 if gone is not None:
                     why = message.payload.decode("utf-8", "replace")
                     self._console.tell({"event": "client-down", "client": client, "name": gone.name, "why": why})
@@ -448,10 +452,20 @@ class GatewayService:
                 pilot = message.kind is RelayKind.PILOT
                 for frame in frames_in(message.payload):
                     if self._core is None:
-                        self._carry_out(without_vehicle(client, frame, pilot=pilot), now)
+                        self._without_vehicle(client, frame, now)
                     else:
                         of = interface.FromPilot if pilot else interface.FromClient
                         self._take(of(client, frame), now)
+
+    def _without_vehicle(self, client: int, frame: bytes, now: Now) -> None:
+        """A frame of a client before the vehicle was heard."""
+        if client not in self._early and client in self._clients:
+            self._early[client] = ClientLink(client, self._clients[client], 0, self._early_actions, now.monotonic_us)
+        if client in self._early:
+            self._early[client].answer_without_vehicle(frame, now.monotonic_us)
+        actions = self._early_actions[:]
+        self._early_actions.clear()
+        self._carry_out(actions, now)
 
     def _from_flight(self, now: Now) -> None:
         session = self._session

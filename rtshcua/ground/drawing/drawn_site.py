@@ -188,12 +188,13 @@ class FlightMark(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class FlownWay:
     """A flown track in parts, which gaps of the telemetry separate, marks along it, and the places of images with their
-    titles, which are drawn without labels.
+    titles, which are drawn without labels. The parts that are `later` came after the last record of the log.
     """
 
     parts: tuple[tuple[FlownPlace, ...], ...]
     marks: tuple[FlightMark, ...] = ()
     images: tuple[tuple[int, int, str], ...] = ()
+    later: tuple[tuple[FlownPlace, ...], ...] = ()
 
 
 def planned_legs(way: PlannedWay, site: Site) -> Iterator[PlannedLeg]:

@@ -112,6 +112,7 @@ class HeightProfile:
     ways: tuple[str, ...]
     failed: tuple[str, ...]
     flown: tuple[str, ...]
+    later: tuple[str, ...]
     stops: tuple[tuple[float, float], ...]
     marks: tuple[DrawnMark, ...]
     labels: tuple[MapLabel, ...]
@@ -171,6 +172,7 @@ class _DrawnHeights(NamedTuple):
     ways: tuple[str, ...] = ()
     failed: tuple[str, ...] = ()
     flown: tuple[str, ...] = ()
+    later: tuple[str, ...] = ()
     ground: tuple[str, ...] = ()
     stops: Mapping[tuple[float, float], Sequence[int]] = MappingProxyType({})
     marks: tuple[DrawnMark, ...] = ()
@@ -213,7 +215,10 @@ def planned_heights(site: Site, way: PlannedWay, refused: RefusedParts = NOT_REF
 
 def flown_heights(site: Site, flown: FlownWay) -> HeightProfile:
     """The side view of a flown track: heights over the time since the flight began, and the marks of the flight."""
-    lines = [[_Place(each.t_us, each.x, each.y, each.height, each.ground) for each in part] for part in flown.parts]
+    lines = [
+        [_Place(each.t_us, each.x, each.y, each.height, each.ground) for each in part]
+        for part in (*flown.parts, *flown.later)
+    ]
     everything = [place for line in lines for place in line] or [_Place(0, *site.home, 0)]
     last = max([place.along for place in everything] + [mark.t_us for mark in flown.marks])
     parts = tuple(_zone_parts(site, map(_thinned, lines)))
@@ -241,7 +246,8 @@ def _flown(
     tracks = [[axes.point(place.along, place.height) for place in line] for line in lines]
     return _DrawnHeights(
         lines=tuple(line[:: len(line) // _TRACK + 1] for line in tracks),
-        flown=tuple(map(points, tracks)),
+        flown=tuple(map(points, tracks[: len(flown.parts)])),
+        later=tuple(map(points, tracks[len(flown.parts) :])),
         ground=tuple(
             points([axes.point(place.along, place.ground or 0) for place in some])
             for line in lines
@@ -358,6 +364,7 @@ def _profile(
         ways=drawn.ways,
         failed=drawn.failed,
         flown=drawn.flown,
+        later=drawn.later,
         stops=tuple(drawn.stops),
         marks=drawn.marks,
         labels=tuple(labels.placed),
@@ -402,6 +409,8 @@ def _keys(site: Site, drawn: _DrawnHeights, bands: Sequence[ZoneBand]) -> Iterat
         yield DrawingKey("failed-mark", "where it leaves the airspace first")
     if drawn.flown:
         yield DrawingKey("flown", "the flown heights")
+    if drawn.later:
+        yield DrawingKey("later", "the heights after the last record of the log")
     if EVENTS & {mark.kind for mark in drawn.marks}:
         yield DrawingKey("event-mark", "a decision, with the number of its record")
     if site.return_altitude:

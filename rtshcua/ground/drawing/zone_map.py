@@ -212,7 +212,7 @@ class DrawnBand(NamedTuple):
 class ZoneMap:
     """A map; `bar` is the length of the scale bar in px, and what that is. `margin` is the band of the position error
     around the way, `stopping` where the vehicle would stop beyond the ends of its legs, and `homeward` the ways home.
-    `ways`, `failed` and `flown` are the points of lines, `images` the places of images.
+    `ways`, `failed`, `flown` and `later` are the points of lines, `images` the places of images.
     """
 
     title: str
@@ -229,6 +229,7 @@ class ZoneMap:
     ways: tuple[str, ...]
     failed: tuple[str, ...]
     flown: tuple[str, ...]
+    later: tuple[str, ...]
     stops: tuple[tuple[float, float], ...]
     marks: tuple[DrawnMark, ...]
     images: tuple[DrawnMark, ...]
@@ -270,7 +271,7 @@ def mission_map(
     places = [site.home, *(place for leg in legs for place in (leg.begin[:2], leg.end[:2]))]
     places += [place for line in _stopping(site, legs) for place in line]
     if flown is not None:
-        places += [(each.x, each.y) for part in flown.parts for each in part]
+        places += [(each.x, each.y) for part in (*flown.parts, *flown.later) for each in part]
         places += [(each.x, each.y) for each in flown.marks]
         places += [(x, y) for x, y, _ in flown.images if max(abs(x), abs(y)) < MOST_AWAY]
     error = site.margins.position_error
@@ -351,6 +352,7 @@ def _map(
         ways=drawn.ways,
         failed=drawn.failed,
         flown=drawn.flown,
+        later=drawn.later,
         stops=tuple(drawn.stops),
         marks=drawn.marks,
         images=drawn.images,
@@ -390,6 +392,7 @@ class _DrawnWay(NamedTuple):
     ways: tuple[str, ...] = ()
     failed: tuple[str, ...] = ()
     flown: tuple[str, ...] = ()
+    later: tuple[str, ...] = ()
     stops: Mapping[tuple[float, float], Sequence[int]] = MappingProxyType({})
     marks: tuple[DrawnMark, ...] = ()
     images: tuple[DrawnMark, ...] = ()
@@ -404,7 +407,8 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
     homeward = [(on.at(*place), home) for place in _homeward(site, legs)]
     stopping = [(on.at(*begin), on.at(*end)) for begin, end in _stopping(site, legs)]
     width = max(2 * site.margins.position_error * on.scale, LEAST_BAND)
-    tracks = () if flown is None else tuple([on.at(each.x, each.y) for each in part] for part in flown.parts)
+    drawn = ((), ()) if flown is None else (flown.parts, flown.later)
+    tracks, later = ([[on.at(each.x, each.y) for each in part] for part in some] for some in drawn)
     marks = [] if flown is None else [DrawnMark(*on.at(each.x, each.y), each.kind, each.label) for each in flown.marks]
     marks += [
         DrawnMark(*on.at(each.x, each.y), "left", f"step {each.number} leaves the airspace") for each in refused.left
@@ -417,10 +421,11 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
         ways=(points(line),),
         failed=tuple(map(points, failed)),
         flown=tuple(map(points, tracks)),
+        later=tuple(map(points, later)),
         stops=_stops(on, shown.way, site),
         marks=tuple(marks),
         images=() if flown is None else tuple(DrawnMark(*on.at(x, y), "image", told) for x, y, told in flown.images),
-        lines=(line, *homeward, *(_thinned_line(each) for each in tracks)),
+        lines=(line, *homeward, *(_thinned_line(each) for each in (*tracks, *later))),
     )
     return way._replace(keys=tuple(_way_keys(site, way)))
 
@@ -442,6 +447,8 @@ def _way_keys(site: Site, way: _DrawnWay) -> Iterator[DrawingKey]:
         yield DrawingKey("failed-mark", "where it leaves the airspace first")
     if way.flown:
         yield DrawingKey("flown", "the flown track")
+    if way.later:
+        yield DrawingKey("later", "the track after the last record of the log")
     if way.images:
         yield DrawingKey("image-mark", "an image, where its camera says that it was taken")
     if kinds & EVENTS:

@@ -61,7 +61,8 @@ _ = FieldKind
 KINDS: Final[Mapping[type, Mapping[str, FieldKind]]] = {
     FlightReport: {
         "title": _.TEXT, "made_by": _.MACHINE, "made_at": _.TIME, "mission": _.NAME, "vehicle": _.NAME, "begun": _.TIME,
-        "begun_utc_us": _.TIME, "lasted_us": _.TIME, "ending": _.MACHINE, "steps_done": _.MACHINE, "steps": _.MACHINE,
+        "begun_utc_us": _.TIME, "lasted_us": _.TIME, "log_ends_us": _.TIME,
+        "ending": _.MACHINE, "steps_done": _.MACHINE, "steps": _.MACHINE,
         "highest": _.HEIGHT, "distance": _.NO_PLACE, "verdict": _.MACHINE, "pinned": _.TEXT, "origin": _.NAME, "root":
         _.MACHINE, "summary": _.PART, "projection": _.NO_PLACE, "site": _.PART, "way": _.PART, "track": _.PART, "bound":
         _.OUTSIDE, "timeline": _.PART, "decisions": _.PART, "images": _.PART, "signals": _.PART, "gaps": _.PART,

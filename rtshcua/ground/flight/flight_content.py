@@ -134,11 +134,12 @@ class AutopilotLogView(NamedTuple):
 class FlightReport(NamedTuple):
     """Everything that a page shows of one flight.
 
-    `highest` is the greatest height above home, and `distance` that over ground, by the telemetry. `verdict` is that
-    of the verification that made the page, `verified`, `incomplete` or `failed`; or else the log is still `growing`, or
-    closed and `unverified`. `images` are those of the log, and `gaps` tells which are missing. `log` is the log as the
-    page embeds it, empty if it is too large; `redacted` names what was removed. `projection` is that of the local
-    plane. `simulated`: the flight says that nothing flew.
+    `highest` is the greatest height above home, and `distance` that over ground, by the telemetry. `log_ends_us`
+    is the time of the last record if the telemetry goes on after it: what is later is drawn apart, and not counted.
+    `verdict` is that of the verification that made the page, `verified`, `incomplete` or `failed`; or else the log is
+    still `growing`, or closed and `unverified`. `images` are those of the log, and `gaps` tells which are missing.
+    `log` is the log as the page embeds it, empty if it is too large; `redacted` names what was removed.
+    `projection` is that of the local plane. `simulated`: the flight says that nothing flew.
     """
 
     title: str
@@ -149,6 +150,7 @@ class FlightReport(NamedTuple):
     begun: str
     begun_utc_us: int
     lasted_us: int
+    log_ends_us: int | None
     ending: str
     steps_done: int
     steps: int

@@ -5,11 +5,13 @@ the same bytes.
 
 import json
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
-from typing import Final
+from operator import itemgetter
+from typing import Final, TypeVar
 from urllib.parse import urlsplit
 
 from markupsafe import Markup
@@ -40,6 +42,8 @@ from rtshcua.ground.flight.units import unit_of
 from rtshcua.model.flat.zone import SHIFT, Projection
 from rtshcua.model.quantity import Dimension, display
 
+_Point = TypeVar("_Point")
+
 #: where the templates are
 PACKAGE: Final = "rtshcua.ground.flight"
 #: the most decisions and events of the timeline that are told in full
@@ -62,14 +66,16 @@ def page(report: FlightReport, *, live: bool = False, tiles: str = "") -> str:
     """
     # a mission may have been issued long before: what is earlier than this stands at the begin of the axis
     first_us = min([0, *(each.t_us for each in report.timeline)])
-    axis = axis_of(max(first_us, -report.lasted_us // _BEFORE), report.lasted_us)
+    axis = axis_of(max(first_us, -report.lasted_us // _BEFORE), _last_us(report))
     flown = _flown(report)
     heights = None if flown is None else flown_heights(report.site, flown)
     seen = report.track is not None and bool(report.track.places)
     plan = mission_map(report.site, report.way, flown=flown) if seen else None
     narrow = axis._replace(width=_NARROW)
     signals = tuple(
-        _signal(each, narrow) for each in report.signals if any(v is not None for _, v in each.series.points)
+        _signal(each, narrow, report.log_ends_us)
+        for each in report.signals
+        if any(v is not None for _, v in each.series.points)
     )
     tiles = tiles if plan is not None else ""
     scripts = [script("cursor.js")]
@@ -129,6 +135,16 @@ def content_policy(scripts: Sequence[str], *, live: bool = False, tiles: str = "
     return f"default-src 'none'; script-src {digests}; {fetching}base-uri 'none'; form-action 'none'"
 
 
+def _last_us(report: FlightReport) -> int:
+    """The end of the time axis: the last record, or the last of the telemetry that goes on after it."""
+    if report.log_ends_us is None:
+        return report.lasted_us
+    track = () if report.track is None else report.track.points
+    times = [each.t_us for each in track[-1:]]
+    times += [t_us for each in report.signals for t_us, _ in each.series.points[-1:]]
+    return max([report.lasted_us, *times])
+
+
 def _flown(report: FlightReport) -> FlownWay | None:
     """The track in parts between gaps of the telemetry, with a mark where each of the first decisions fell."""
     track = report.track
@@ -149,14 +165,25 @@ def _flown(report: FlightReport) -> FlownWay | None:
     images = tuple(
         (*each.where, f"image {each.number}") for each in report.images[:_MOST_IMAGES] if each.where is not None
     )
-    return FlownWay(tuple(tuple(flown[part.start : part.stop]) for part in parts(track.points)), marks, images)
+    apart = [tuple(flown[part.start : part.stop]) for part in parts(track.points)]
+    split = [_split(each, report.log_ends_us, lambda place: place.t_us) for each in apart]
+    later = tuple(tuple(each) for _, each in split if each)
+    return FlownWay(tuple(tuple(each) for each, _ in split if each), marks, images, later)
+
+
+def _split(
+    points: Sequence[_Point], log_ends_us: int | None, time: Callable[[_Point], int]
+) -> tuple[Sequence[_Point], Sequence[_Point]]:
+    """The points of a line up to the end of the log, and from the last of these on; the latter only if more follow."""
+    end = len(points) if log_ends_us is None else bisect_right(points, log_ends_us, key=time)
+    return points[:end], points[max(end - 1, 0) :] if end < len(points) else ()
 
 
 def _scaled(points: Sequence[tuple[int, int | None]], divide: int) -> list[tuple[int, float | None]]:
     return [(t_us, None if value is None else value / divide) for t_us, value in points]
 
 
-def _signal(view: SignalCurve, axis: TimeAxis) -> TimeChart:
+def _signal(view: SignalCurve, axis: TimeAxis, log_ends_us: int | None) -> TimeChart:
     series = view.series
     unit = unit_of(series)
     divide = 10**unit.digits
@@ -165,8 +192,11 @@ def _signal(view: SignalCurve, axis: TimeAxis) -> TimeChart:
     used = {int(value) for _, value in points if value is not None}
     labels = {number: series.labels.get(number, str(number)) for number in sorted(used)} if series.labels else None
     told = f"The values of {series.name} over time."
-    line = ChartLine("signal", series.name, points, series.stale_us)
-    return time_chart(series.name, told, unit.symbol, axis, [line], limits, labels)
+    until, later = _split(points, log_ends_us, itemgetter(0))
+    lines = [ChartLine("signal", series.name, until, series.stale_us)]
+    if later:
+        lines.append(ChartLine("later", f"{series.name} after the last record of the log", later, series.stale_us))
+    return time_chart(series.name, told, unit.symbol, axis, lines, limits, labels)
 
 
 def _lanes(report: FlightReport, axis: TimeAxis) -> LaneChart:

@@ -5,18 +5,14 @@ Latitude and longitude are WGS 84 in 1e-7 degree; heights in mm, each with its d
 here: only the log is evidence, and the telemetry is what was heard on the link.
 """
 
-from bisect import bisect_right
 from collections.abc import Mapping
-from operator import itemgetter
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from rtshcua.evidence.records import AnyRecord, Close, Genesis
 from rtshcua.ground.flight.log_times import LogSegment, since_begun
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import project
-
-_Timed = TypeVar("_Timed", bound=tuple[Any, ...])
 
 
 class TrackPoint(NamedTuple):
@@ -85,8 +81,8 @@ class FlightTelemetry(NamedTuple):
     vehicle left the ground. `boot_us` has for each point of the track its time and the autopilot's own time since its
     boot, in us. If it has the reports of several vehicles (MAVLink system ids) that may be the one that was commanded,
     `vehicles` are these, and the first is the one that is told. Of `stray` positions nobody knows the time, because
-    the clock made `steps`; they are left out. `ended_us` is the time of the last report;
-    `later_us` is how much was left out at the end, because the log ends before it.
+    the clock made `steps`; they are left out. `later_us` is how long
+    it goes on after the last record of a log that is not recorded any more.
     """
 
     reports: int
@@ -100,25 +96,7 @@ class FlightTelemetry(NamedTuple):
     vehicles: tuple[int, ...] = ()
     steps: tuple[ClockJump, ...] = ()
     stray: int = 0
-    ended_us: int = 0
     later_us: int = 0
-
-    def until(self, end_us: int) -> "FlightTelemetry":
-        """The same without what was said later. Home, the number of reports and the end stay."""
-
-        def before(points: tuple[_Timed, ...]) -> tuple[_Timed, ...]:
-            return points[: bisect_right(points, end_us, key=itemgetter(0))]
-
-        return self._replace(
-            track=before(self.track),
-            signals=tuple(each._replace(points=before(each.points)) for each in self.signals),
-            texts=before(self.texts),
-            silences=tuple(
-                each._replace(to_us=min(each.to_us, end_us)) for each in self.silences if each.from_us < end_us
-            ),
-            boot_us=before(self.boot_us),
-            later_us=max(self.ended_us - end_us, 0),
-        )
 
 
 class Flight(NamedTuple):

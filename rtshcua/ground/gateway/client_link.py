@@ -15,12 +15,13 @@ TEXT_EVERY_US: Final = 5_000_000
 _MOST_CHUNKS: Final = 4
 _MOST_KEYS: Final = 64
 #: what a client can cause as often as it likes; everything else is recorded at any rate
-_OFTEN: Final = frozenset({"refused", "absorbed", "passed"})
+_OFTEN: Final = frozenset({"refused", "withdrawn", "absorbed", "passed"})
 #: how many records at once, and the interval after that, us
 _RECORDS: Final = 20
 _RECORD_EVERY_US: Final = 200_000
 _TARGET: Final = ("target_system", "target_component")
 _FIRST_SYSTEM: Final = 1  # what autopilots are unless they are told otherwise
+_UNHEARD: Final = "no vehicle was heard yet"
 #: MAV_SEVERITY
 WARNING: Final = 4
 NOTICE: Final = 5
@@ -135,23 +136,21 @@ class ClientLink:
         said |= detail
         self._actions.append(ClientNote(said))
 
-
-def without_vehicle(client: int, frame: bytes, *, pilot: bool) -> list[Action]:
-    """The answer to a command before a vehicle was heard: not now, with a text, from whom it is for. Of a pilot's
-    commands only those that request control are answered; all others went to the vehicle's link.
-    """
-    message = received(frame)
-    if message is None or message.message not in (layouts.COMMAND_LONG, layouts.COMMAND_INT):
-        return []
-    command, to_system, to_component = (message.fields[each] for each in ("command", *_TARGET))
-    if pilot and command != enums.MAV_CMD_REQUEST_OPERATOR_CONTROL:
-        return []
-    of = to_system or _FIRST_SYSTEM, to_component or enums.MAV_COMP_ID_AUTOPILOT1
-    answer = {"command": command, "result": TEMPORARILY_REJECTED, "progress": 255}
-    answer |= dict(zip(_TARGET, message.sender, strict=True))
-    said = {"severity": WARNING, "text": b"no vehicle was heard yet: ask again"}
-    frames = made(layouts.STATUSTEXT, said, of, 0), made(layouts.COMMAND_ACK, answer, of, 1)
-    return [ToClient(client, each) for each in frames]
+    def answer_without_vehicle(self, frame: bytes, now_us: int) -> None:
+        """Answer a command before a vehicle was heard: not now, with a text, from whom it is for. Of a pilot's commands
+        only those that request control are answered; all others went to the vehicle's link.
+        """
+        message = received(frame)
+        if message is None or message.message not in (layouts.COMMAND_LONG, layouts.COMMAND_INT):
+            return
+        command, system, component = (message.fields[each] for each in ("command", *_TARGET))
+        if self.settings.pilot and command != enums.MAV_CMD_REQUEST_OPERATOR_CONTROL:
+            self.record("passed", now_us, message=message.message, command=command)
+            return
+        self._autopilot = system or _FIRST_SYSTEM, component or enums.MAV_COMP_ID_AUTOPILOT1
+        self.text(f"{_UNHEARD}: ask again", now_us)
+        self.ack(message.sender, command, TEMPORARILY_REJECTED)
+        self.record("refused", now_us, command=command, reason=_UNHEARD)
 
 
 def _chunks(text: bytes) -> list[bytes]:

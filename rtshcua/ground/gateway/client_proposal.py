@@ -18,7 +18,7 @@ from rtshcua.wire.request import STEP
 #: from when on a waiting command is in progress, and how often that is repeated, us
 QUICK_US: Final = 250_000
 AGAIN_US: Final = 4_000_000
-#: how long the worker and the flight may take to answer a proposal, us
+#: how long the worker may take to answer a proposal, us
 PATIENCE_US: Final = 30_000_000
 #: the events that end a step that was dispatched
 _ENDS: Final = frozenset({"succeeded", "failed", "time-over", "superseded"})
@@ -126,12 +126,10 @@ class ClientProposal:
         self.asked_by = list(dict.fromkeys(moved))
 
     def tick(self, now_us: int) -> None:
-        """Tell the client that it is in progress; give up when nobody answers."""
+        """Tell the client that it is in progress."""
         if self.ended or self.answered:
             return
-        if not self.taken and now_us - self.began_us > PATIENCE_US:
-            self.refuse(TEMPORARILY_REJECTED, f"{self.steps[0].skill} rejected: nothing answered in time", now_us)
-        elif now_us - (self.told_us or self.began_us - AGAIN_US + QUICK_US) >= AGAIN_US:
+        if now_us - (self.told_us or self.began_us - AGAIN_US + QUICK_US) >= AGAIN_US:
             self.told_us = now_us
             for each in self.asked_by:
                 each.tell(IN_PROGRESS)

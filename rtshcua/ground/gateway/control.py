@@ -26,8 +26,8 @@ KEEPS_US: Final = 10_000_000
 #: what of a pilot's frames is recorded
 _RECORDED: Final = frozenset(
     {
-        layouts.COMMAND_LONG, layouts.COMMAND_INT, layouts.SET_MODE, layouts.PARAM_SET, layouts.MISSION_COUNT,
-        layouts.MISSION_CLEAR_ALL, *SETPOINTS, layouts.SETUP_SIGNING,
+        layouts.COMMAND_LONG, layouts.COMMAND_INT, layouts.COMMAND_CANCEL, layouts.SET_MODE, layouts.PARAM_SET,
+        layouts.MISSION_COUNT, layouts.MISSION_CLEAR_ALL, *SETPOINTS, layouts.SETUP_SIGNING,
     }
 )  # fmt: skip
 
@@ -67,7 +67,11 @@ class Pilots:
         if message.message not in _RECORDED:
             return False
         command = message.fields.get("command")
-        asks = command == enums.MAV_CMD_REQUEST_OPERATOR_CONTROL and message.is_for(self._system)
+        asks = (
+            command == enums.MAV_CMD_REQUEST_OPERATOR_CONTROL
+            and message.message != layouts.COMMAND_CANCEL
+            and message.is_for(self._system)
+        )
         detail = {} if command is None else {"command": command}
         link.record("absorbed" if asks else "passed", now_us, message=message.message, **detail)
         if not asks:

@@ -11,7 +11,7 @@ from typing import Any, Final, TypeAlias
 
 from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
-from rtshcua.ground.gateway.client_proposal import AGAIN_US, AskedBy, ClientProposal
+from rtshcua.ground.gateway.client_proposal import AGAIN_US, PATIENCE_US, AskedBy, ClientProposal
 from rtshcua.ground.gateway.control import Control
 from rtshcua.ground.gateway.gateway_state import MOST_DECISIONS, ConnectedClient, FlightSeen, GatewayState
 from rtshcua.ground.gateway.interface import Cancel, ProposalChecked, ProposedStep, Withdraw
@@ -258,6 +258,18 @@ class Proposing:
             if each.first < 0:
                 self._state.actions.append(Withdraw(each.number))
                 each.refuse(CANCELLED, f"{each.steps[0].skill} withdrawn: {why}", now_us)
+
+    def tick(self, now_us: int) -> None:
+        """Tell clients what is in progress, and withdraw what the worker does not answer. What the flight has may still
+        fly: that is in progress until the flight answers, or ends.
+        """
+        for each in list(self._state.proposals.values()):
+            if each.first < 0 and not each.ended and now_us - each.began_us > PATIENCE_US:
+                self._state.actions.append(Withdraw(each.number))
+                text = f"{each.steps[0].skill} rejected: nothing answered in time"
+                each.refuse(TEMPORARILY_REJECTED, text, now_us)
+            else:
+                each.tick(now_us)
 
     def cancel(self, client: ConnectedClient, command: int, now_us: int) -> None:
         """COMMAND_CANCEL: withdraw what a client asked for by this command and what did not begin yet, which answers

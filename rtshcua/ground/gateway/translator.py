@@ -351,8 +351,7 @@ class Gateway:
         now_us = now.monotonic_us
         self._state.requests.tick(now_us)
         self._proposing.take_held(now)
-        for proposal in list(self._state.proposals.values()):
-            proposal.tick(now_us)
+        self._proposing.tick(now_us)
         every_second = now_us - self._second_us >= SECOND_US
         for client in list(self._state.clients.values()):
             client.transfer.tick(now_us)

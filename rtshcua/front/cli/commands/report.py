@@ -15,7 +15,7 @@ from rtshcua.app.documents import no_log
 from rtshcua.app.flights.flight_report import FlightReportRequest
 from rtshcua.app.flights.redaction import REDACTABLE, redaction_of
 from rtshcua.app.flights.report_pages import FlightPage, Logbook, default_target, flight_page, target_of
-from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_meant, worst
+from rtshcua.app.logs import NO_LOG_HELP, is_log, logs_or_unread, worst
 from rtshcua.app.pin import trusted
 from rtshcua.app.wording import many, moment
 from rtshcua.diagnostics.exits import ExitCode
@@ -87,7 +87,7 @@ def report(
     made_at = time.time_ns() // 1_000 if at is None else moment(at)
     if made_at is None:
         return fail(ExitCode.USAGE, f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    logs = list({os.path.realpath(log): log for log in reversed(logs_meant(runs))}.values())[::-1]
+    logs = list({os.path.realpath(log): log for log in reversed(logs_or_unread(runs))}.values())[::-1]
     if len(logs) == 1 and not is_log(logs[0]):
         return fail(ExitCode.INPUT, *no_log(logs[0], logs[0], NO_LOG_HELP))
     request = FlightReportRequest(logs[0], pinned, tuple(sources or (Path(),)), made_at, removed)
@@ -142,7 +142,7 @@ def _several(
 ) -> ExitCode:
     logbook, codes, number = Logbook(folder, request, tiles), list[ExitCode](), 0
     for log in logs:
-        with octets_of("verifying", log.stat().st_size if log.is_file() else 0) as progress:
+        with octets_of("verifying", _octets(log)) as progress:
             made = logbook.add(log, progress)
         if isinstance(made, Refusal):
             codes.append(refuse(made))
@@ -160,6 +160,14 @@ def _several(
     if index is not None:
         say(f"{many(number, 'flight')}: open {index}")
     return worst(codes)
+
+
+def _octets(log: Path) -> int:
+    """The size of a log; 0 if it cannot be read, which is told later."""
+    try:
+        return log.stat().st_size if log.is_file() else 0
+    except OSError:
+        return 0
 
 
 def _line(made: FlightPage) -> str:

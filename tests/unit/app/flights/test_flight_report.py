@@ -141,31 +141,46 @@ def test_log_without_end_is_incomplete(completed: Path, tmp_path: Path) -> None:
     assert {"telemetry", "witnesses"} <= {each.what for each in report.gaps}
 
 
-def test_telemetry_after_the_last_record_is_neither_drawn_nor_counted(completed: Path, tmp_path: Path) -> None:
-    """The log was cut before the vehicle flew on to its highest place; the telemetry goes on to the landing."""
+def cut_in_flight(run: Path, to: Path) -> None:
+    """A copy of a run whose log was cut before the vehicle flew on to its highest place; the telemetry goes on."""
+    lines = (run / "log.jsonl").read_bytes().splitlines(keepends=True)
+    began = next(number for number, line in enumerate(lines) if b'"event":"dispatched"' in line)
+    (to / "log.jsonl").write_bytes(b"".join(lines[: began + 3]))
+    (to / "telemetry.tlog").write_bytes((run / "telemetry.tlog").read_bytes())
+
+
+def test_telemetry_after_the_last_record_is_shown_and_not_counted(completed: Path, tmp_path: Path) -> None:
     whole = report_of(completed).report
     assert whole.track is not None
+    assert whole.log_ends_us is None
     assert not [each for each in whole.gaps if "after the last record" in each.told]
-    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
-    began = next(number for number, line in enumerate(lines) if b'"event":"dispatched"' in line)
-    (tmp_path / "log.jsonl").write_bytes(b"".join(lines[: began + 3]))
-    (tmp_path / "telemetry.tlog").write_bytes((completed / "telemetry.tlog").read_bytes())
+    cut_in_flight(completed, tmp_path)
     report = report_of(tmp_path).report
     assert report.track is not None
-    assert 0 < len(report.track.points) < len(whole.track.points) / 2
-    assert all(each.t_us <= report.lasted_us for each in report.track.points)
-    assert all(t_us <= report.lasted_us for each in report.signals for t_us, _ in each.series.points)
+    assert report.track.points[-1].t_us == whole.track.points[-1].t_us > report.lasted_us
+    assert report.log_ends_us == report.lasted_us
     assert report.highest is not None
     assert whole.highest is not None
     assert report.highest < whole.highest
     assert report.distance is not None
     assert whole.distance is not None
     assert report.distance < whole.distance
+    assert f"up to {round(report.highest / 100) / 10} m above home" in dict(report.summary)["What flew"]
     (told,) = [each.told for each in report.gaps if "after the last record" in each.told]
-    found = re.search(r"it has ([0-9.]+) s after", told)
+    found = re.search(r"it goes on for ([0-9.]+) s after the last record of the log: drawn dashed", told)
     assert found is not None
     ended_us = max(each.t_us for each in whole.track.points)
     assert abs(float(found[1]) * 1_000_000 - (ended_us - report.lasted_us)) < 1_500_000
+
+
+def test_telemetry_after_the_last_record_is_drawn_apart(completed: Path, tmp_path: Path) -> None:
+    cut_in_flight(completed, tmp_path)
+    whole, cut = page(report_of(completed).report), page(report_of(tmp_path).report)
+    for drawn in ('"flown later"', '"line later"', "swatch later"):
+        assert (drawn in whole, drawn in cut) == (False, True)
+    assert cut.count("swatch later") == 2, "keys of the map and of the heights"
+    spans = [re.findall(r'data-span="[0-9.]+ [0-9.]+ -?[0-9]+ ([0-9]+)"', text) for text in (whole, cut)]
+    assert all(abs(int(one) - int(other)) < 1_000 for one, other in zip(*spans, strict=True)), "the axis has all of it"
 
 
 def test_growing_flight_is_drawn_beyond_its_last_record(completed: Path, tmp_path: Path) -> None:

@@ -1,15 +1,18 @@
 """Proposals become a bundle, then replacements that the vehicle's boundary accepts, whatever happens in between."""
 
+import json
 import socket
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+import msgspec
 import pytest
 from pymavlink.dialects.v10 import ardupilotmega as mavlink1
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rtshcua.adapters.gateway.messages import RelayKind, RelayMessage, Up
 from rtshcua.adapters.store.keystore import KeyStore, read_key
 from rtshcua.app.gateway.configuration import ConfiguredClient
 from rtshcua.app.gateway.gateway_service import FlightWords, GatewayService
@@ -410,3 +413,16 @@ def test_frames_of_mavlink_1_on_the_vehicles_link_are_no_fault(policy: PolicyInF
             assert service._turn(service._wait()) is None
         assert service._frames is not None
         assert service._frames.aloft, "frames between them are read"
+
+
+def test_commands_before_the_vehicle_was_heard_are_recorded(policy: PolicyInForce, tmp_path: Path) -> None:
+    takeoff = mavlink.MAVLink_command_long_message(1, 1, 22, 0, 0, 0, 0, 0, 0, 0, 10).pack(
+        mavlink.MAVLink(None, 245, 1)
+    )
+    with serving(policy, tmp_path) as (service, _):
+        up = RelayMessage(RelayKind.UP, 7, msgspec.json.encode(Up(0, "127.0.0.1:9")))
+        for message in (up, RelayMessage(RelayKind.CLIENT, 7, bytes(takeoff))):
+            service._from_relay(message, Now(0, 0, 0))
+    (line,) = map(json.loads, (tmp_path / "gateway.jsonl").read_text().splitlines())
+    assert (line["client"], line["effect"], line["command"]) == ("script", "refused", 22)
+    assert line["reason"] == "no vehicle was heard yet"

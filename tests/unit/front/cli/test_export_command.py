@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -137,6 +138,20 @@ def test_telemetry_that_is_cut_is_exported_with_a_warning(capsys: pytest.Capture
     assert f"{frames} frames" in said.out
     assert export(f"runs/{RUN}", "--to", "kml", "-o", "flight.kml") == ExitCode.OK
     assert "warning: the telemetry is damaged from byte" in capsys.readouterr().err
+
+
+def test_telemetry_after_the_end_of_a_cut_log_is_exported_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
+    run = Path("runs", RUN)
+    assert export(run, "--to", "csv", "-o", "whole.csv") == ExitCode.OK
+    assert "after the last record" not in capsys.readouterr().err
+    log = run / "log.jsonl"
+    lines = log.read_bytes().splitlines(keepends=True)
+    log.write_bytes(b"".join(lines[:3]))
+    assert export(run, "--to", "csv", "-o", "cut.csv") == ExitCode.OK
+    said = " ".join(capsys.readouterr().err.split())
+    assert re.search(r"warning: the telemetry: it goes on for [0-9.]+ s after the last record of the log", said)
+    whole, cut = (list(csv.reader(io.StringIO(Path(name).read_text()))) for name in ("whole.csv", "cut.csv"))
+    assert len(cut) == len(whole) > 10
 
 
 def test_without_telemetry_only_the_plan_is_exported(capsys: pytest.CaptureFixture[str]) -> None:

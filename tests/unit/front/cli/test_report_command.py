@@ -6,11 +6,13 @@ import os
 import re
 import shutil
 import sys
+from errno import EACCES
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 
+from rtshcua.adapters.store.runs import logs_of
 from rtshcua.app.logs import worst
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
@@ -259,6 +261,32 @@ def test_unreadable_entries_do_not_stop_the_logbook(runs: Path, here: Path, caps
     assert "1 flight: open book/index.html" in capsys.readouterr().err
     assert main(["report", *given, "-o", "picture", "--redact", "names", *ROOT]) == ExitCode.INPUT
     assert "d-text" not in Path("picture/index.html").read_text(encoding="utf-8")
+
+
+def test_paths_that_cannot_be_opened_are_rows_of_the_logbook(
+    runs: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A link to itself, a name that is too long, and a folder of runs of which one may not be searched."""
+    shutil.copytree(runs / "a", here / "all" / "a-flight")
+    for name in ("b-private", "c-notes"):
+        (here / "all" / name).mkdir()
+    Path("loop").symlink_to("loop")
+
+    def denied(path: Path) -> list[Path]:
+        if path.name in ("all", "b-private"):  # a superuser may search all folders
+            raise PermissionError(EACCES, "Permission denied", str(path / "b-private"))
+        return logs_of(path)
+
+    monkeypatch.setattr("rtshcua.app.logs.logs_of", denied)
+    assert main(["report", "all", "loop", "x" * 300, "-o", "book", *ROOT]) == ExitCode.INPUT
+    page = Path("book/index.html").read_text(encoding="utf-8")
+    assert "3 more could not be read" in page
+    assert 'href="./a-flight.html"' in page
+    for name in ("b-private", "loop", "x" * 300):
+        assert f'<td colspan="7">{name}: ' in page
+    capsys.readouterr()
+    assert main(["report", "loop", *ROOT]) == ExitCode.INPUT
+    assert "too many levels of symbolic links: `loop`" in capsys.readouterr().err
 
 
 def test_exit_code_of_a_logbook_is_the_worst(runs: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:

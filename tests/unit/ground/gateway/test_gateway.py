@@ -24,6 +24,7 @@ from rtshcua.ground.gateway.interface import (
     ClientNote,
     FlightEnded,
     FromClient,
+    FromPilot,
     FromVehicle,
     ProposalAnswered,
     ProposalChecked,
@@ -175,14 +176,39 @@ def test_refusals_of_the_worker_and_of_the_flight_are_answers() -> None:
 def test_nobody_waits_for_ever() -> None:
     world = GatewayWorld()
     world.ready()
-    world.send(TAKEOFF)
+    proposed = number(world.send(TAKEOFF))
     actions = world.wait(31_000_000, step_us=500_000)
     assert acks(actions)[-1] == (22, 1)
     assert texts(actions) == ["takeoff rejected: nothing answered in time"]
+    assert Withdraw(proposed) in actions, "it does not fly after all"
     world = GatewayWorld()
     world.ready()
     world.accept(world.send(TAKEOFF))
     assert (22, 1) not in acks(world.wait(60_000_000, step_us=500_000)), "an approval may take longer"
+
+
+def test_what_the_flight_has_is_in_progress_until_the_flight_answers() -> None:
+    """It may still fly, so nobody is told that it was rejected or cancelled."""
+    for cancelled in (False, True):
+        world = GatewayWorld()
+        world.ready()
+        world.take(ProposalChecked(number(world.send(TAKEOFF)), None, 0))
+        actions = command_cancel(world, 22) if cancelled else []
+        actions += world.wait(60_000_000, step_us=500_000)
+        assert {result for _, result in acks(actions)} == {5}
+        actions = world.line(type="mission")
+        assert cancels(actions) == ([1] if cancelled else [])
+        assert acks(world.line(type="close", ending="ended")) == [(22, 6 if cancelled else 1)]
+
+
+def test_records_of_cancelled_commands_are_counted_beyond_a_rate() -> None:
+    world = GatewayWorld()
+    recorded = []
+    for _ in range(200):
+        recorded += records(world.send(TAKEOFF)) + records(command_cancel(world, 22))
+        world.wait(50_000)
+    assert len(recorded) <= 20 + 5 * 10 + 1
+    assert any(each.get("left_out") for each in recorded)
 
 
 def test_a_new_target_supersedes_the_one_before() -> None:
@@ -415,6 +441,15 @@ def test_a_pilots_request_for_another_vehicle_gives_no_control_here() -> None:
         assert [each["effect"] for each in records(actions)] == ["passed"]
         assert controls(actions) == []
         assert acks(actions, 9) == []
+
+
+def test_a_pilots_command_cancel_is_recorded_and_gives_no_control() -> None:
+    world = GatewayWorld()
+    world.client(9, "tower", pilot=True)
+    values = {"command": 32_100, "target_system": 1, "target_component": 1}
+    actions = world.take(FromPilot(9, made(layouts.COMMAND_CANCEL, values, (250, 1), 0)))
+    assert [(each["effect"], each["command"]) for each in records(actions)] == [("passed", 32_100)]
+    assert (acks(actions, 9), controls(actions)) == ([], [])
 
 
 @pytest.mark.parametrize("message", [DISARMS, *SAFE])

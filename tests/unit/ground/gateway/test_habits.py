@@ -23,10 +23,11 @@ from reference.gateway_world import (
 )
 from reference.sources import CHECKOUT
 from rtshcua.ground.gateway.accepted import COMMAND, AcceptedCommand, ArgumentSource
-from rtshcua.ground.gateway.client_link import without_vehicle
+from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.interface import (
     Action,
     ClientNote,
+    ClientSettings,
     FlightEnded,
     Propose,
     RequestFrame,
@@ -417,13 +418,24 @@ def test_frames_for_another_system_are_not_answered() -> None:
     assert world.send(mavlink.MAVLink_set_mode_message(9, 1, 4)) == []
 
 
+def early(*frames: bytes, pilot: bool = False) -> tuple[list[Action], list[tuple[str, int]]]:
+    """The answers to frames before a vehicle was heard, and the effects and commands of the records."""
+    actions: list[Action] = []
+    link = ClientLink(4, ClientSettings("script", "operator", pilot=pilot), 0, actions, 0)
+    for frame in frames:
+        link.answer_without_vehicle(frame, 0)
+    said = [each.said for each in actions if isinstance(each, ClientNote)]
+    answers = [each for each in actions if not isinstance(each, ClientNote)]
+    return answers, [(each["effect"], each["command"]) for each in said]
+
+
 @pytest.mark.parametrize("target", [(0, 0), (1, 1), (7, 1)])
 def test_a_command_before_a_vehicle_was_heard_is_answered_from_whom_it_is_for(target: tuple[int, int]) -> None:
     speaker = mavlink.MAVLink(None, 245, 190)
     for message in (command_long(22), command_int(192, 6, x=0, y=0, z=0), command_long(32100, 1)):
         message.target_system, message.target_component = target
         frame = bytes(message.pack(speaker))
-        actions = without_vehicle(4, frame, pilot=False)
+        actions, records = early(frame)
         reader = mavlink.MAVLink(None)
         text, ack = (reader.decode(bytearray(each.frame)) for each in actions if isinstance(each, ToClient))
         assert {each.client for each in actions if isinstance(each, ToClient)} == {4}
@@ -431,9 +443,13 @@ def test_a_command_before_a_vehicle_was_heard_is_answered_from_whom_it_is_for(ta
         assert (ack.command, ack.result, ack.target_system, ack.target_component) == (message.command, 1, 245, 190)
         assert (ack.get_srcSystem(), ack.get_srcComponent()) == (target[0] or 1, target[1] or 1)
         asks_for_control = message.command == 32100
-        assert bool(without_vehicle(4, frame, pilot=True)) is asks_for_control, "the others went to the vehicle"
+        assert records == [("refused", message.command)]
+        actions, records = early(frame, pilot=True)
+        assert bool(actions) is asks_for_control, "the others went to the vehicle"
+        assert records == [("refused" if asks_for_control else "passed", message.command)]
     beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(speaker)
-    assert without_vehicle(4, bytes(beat), pilot=False) == without_vehicle(4, b"\xfd", pilot=False) == []
+    assert early(bytes(beat)) == early(b"\xfd") == ([], [])
+    assert len(early(*[bytes(command_long(22).pack(speaker))] * 100)[1]) == 20, "more are counted"
 
 
 YAW = "yaw is not flown: the autopilot turns the vehicle"

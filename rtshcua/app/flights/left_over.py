@@ -43,6 +43,8 @@ _TELLING: Final = (
 )  # fmt: skip
 _DIGEST: Final = re.compile(r"'sha256-[A-Za-z0-9+/]{43}='")
 _DECIMALS: Final = re.compile(r"-?\d{1,3}\.\d{4,}")
+#: a digest is shown as so many groups
+_GROUP, _GROUPS = re.compile(r"[0-9a-f]{8}"), 8
 _WHOLE: Final = re.compile(r"-?\b\d{7,10}\b")
 #: about a degree, in 1e-7 degree
 _NEAR: Final = 10_000_000
@@ -128,6 +130,15 @@ class _Reader(HTMLParser):
         self.texts.append(data)
 
 
+def _without_digests(texts: Sequence[str]) -> Iterator[str]:
+    """The texts without digests that are shown in groups: one of these may consist of decimal digits alone."""
+    shown = [text for text in texts if text.strip()]
+    groups = "".join("x" if _GROUP.fullmatch(text.strip()) else "." for text in shown)
+    for run in re.finditer(r"x+|\.+", groups):
+        if len(run[0]) != _GROUPS:
+            yield from shown[run.start() : run.end()]
+
+
 class LeftOver:
     """Searches for names, except those that are ordinary words or that the report `said` in a field of a closed list;
     and, near `home` (1e-7 degree), for places. `may_stay` is that of the lines of the embedded log.
@@ -160,6 +171,7 @@ class LeftOver:
         reader.close()
         for text in reader.texts:
             yield from self._in_text(text)
+        for text in _without_digests(reader.texts):
             yield from self._in_places(text)
         for text in reader.attributes:
             yield from self._in_text(_DIGEST.sub("", text))

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from rtshcua.ground.checker.checks.accepts import MODES
 from rtshcua.ground.checker.checks.contracts import CLASSES, RECORDS
+from rtshcua.ground.checker.checks.emits import EMITTABLE
 from rtshcua.ground.checker.checks.policies import SOURCES
 from rtshcua.ground.checker.checks.roles import OPERATOR
 from rtshcua.ground.checker.checks.scenarios import ENDS
@@ -224,14 +225,15 @@ class _Proposals:
 
     def _accepted(self, use: NameUse) -> Iterator[CompletionItem]:
         """The names of MAVLink in an `accepts`: commands, modes, and fields of its command or message."""
+        emits = accepts_before(self.written, "emits")
         if use is NameUse.COMMAND:
-            yield from (CompletionItem(name, use.value) for name in self.dialect.commands)
+            yield from (CompletionItem(name, use.value) for name in (EMITTABLE if emits else self.dialect.commands))
             return
         if use is NameUse.MODE:
             modes = ((name, autopilot) for autopilot, all in MODES.items() for name in all.__members__)
             yield from (CompletionItem(name, use.value, autopilot) for name, autopilot in modes)
             return
-        names = [token.text for token in accepts_before(self.written)]
+        names = [token.text for token in emits or accepts_before(self.written)]
         command = next((self.dialect.commands[name] for name in names if name in self.dialect.commands), {})
         message = next((self.dialect.messages[name] for name in names if name in self.dialect.messages), None)
         for name, field in command.items() if message is None else message.fields.items():

@@ -144,6 +144,9 @@ def name_use(written: list[Token]) -> NameUse:
     accepts = accepts_before(written)
     if accepts:
         return _in_accepts(accepts)
+    emits = accepts_before(written, "emits")
+    if emits:
+        return _in_emits(emits)
     call = open_call(written)
     if call is not None:
         return _in_call(written, call, last)
@@ -158,14 +161,14 @@ def name_use(written: list[Token]) -> NameUse:
 #: the keywords at which an `accepts` before the cursor has ended
 _OTHER_PARTS = frozenset(
     ("motion", "class", "deadline", "valid", "lasts", "grace", "require", "assume", "maintain", "fallback", "energy",
-     "record", "pictures", "{", "}")
+     "record", "accepts", "emits", "pictures", "{", "}")
 )  # fmt: skip
 
 
-def accepts_before(written: list[Token]) -> list[Token]:
-    """The tokens of the `accepts` that contains the cursor; empty if there is none."""
+def accepts_before(written: list[Token], part: str = "accepts") -> list[Token]:
+    """The tokens of the `accepts`, or the `emits`, that contains the cursor; empty if there is none."""
     for at in range(len(written) - 1, -1, -1):
-        if written[at].text == "accepts":
+        if written[at].text == part:
             return written[at:]
         if written[at].text in _OTHER_PARTS:
             break
@@ -184,6 +187,17 @@ def _in_accepts(written: list[Token]) -> NameUse:
     if last == "=":
         return NameUse.FIELD if "with" in texts else NameUse.NOTHING
     return after.get(last, NameUse.NOTHING)
+
+
+def _in_emits(written: list[Token]) -> NameUse:
+    """Return the use of a name in an `emits`: of a command, its parameter, or a parameter of the skill."""
+    last = written[-1].text
+    if last == "=":
+        return NameUse.PARAMETER
+    in_list = last == "," and "with" in [token.text for token in written]
+    return (
+        NameUse.COMMAND if last == "emits" else NameUse.FIELD if in_list or last in ("with", "(") else NameUse.NOTHING
+    )
 
 
 def _unclosed(written: list[Token]) -> Iterator[tuple[int, Token]]:

@@ -17,7 +17,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, SIGNATURE
 from rtshcua.mavlink.signing import MINUTE, UNIT_US, Counts, Stream, stream_of, timestamp_in
 from rtshcua.model.flat.situation import Now
-from rtshcua.onboard.enforcement import executor, frames, preparation
+from rtshcua.onboard.enforcement import executor, frames, payload_gate, preparation
 from rtshcua.onboard.enforcement.ahead import MOST, NOT_AHEAD, Encode, FramesAhead
 from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
 from rtshcua.onboard.enforcement.executor import Commands, Made, SignedAhead
@@ -72,7 +72,7 @@ def _known(*modules: object) -> dict[str, Refusal]:
 
 
 #: the reasons of refusals, by slug, with the texts of the boundary in this process
-_REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, frames, preparation))
+_REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, frames, payload_gate, preparation))
 
 
 class Caller:

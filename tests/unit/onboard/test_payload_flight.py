@@ -19,6 +19,7 @@ from rtshcua.ground.audit.audit import Auditor
 from rtshcua.ground.audit.frames import OURS, FrameAudit
 from rtshcua.mavlink.parameters import NAN, nearest_bits
 from rtshcua.model.flat.contract import Addressee, Contract, EmissionMoment, EmissionSuccess
+from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Ending, Interrupted
 from virtual import case
 from virtual.flight import Flight
@@ -48,11 +49,11 @@ Flown = tuple[tuple[bytes, ...], tuple[tuple[int, bytes], ...], PayloadStandIn, 
 
 
 @cache
-def flown(kind: str, stopped: bool = False) -> Flown:
+def flown(kind: str, mode: EnforcementMode = EnforcementMode.SOFTWARE, *, stopped: bool = False) -> Flown:
     """A flight of one leg, or one that is stopped on it: its lines, its frames, and its payload."""
     policy = replace(case.policy(), contracts=tuple(map(emitting, case.policy().contracts)))
     steps = [replace(each, contract=emitting(each.contract)) for each in case.short_steps()]
-    flight = Flight(case.seal(case.mission(steps), policy), case.simulated(kind), attested=False)
+    flight = Flight(case.seal(case.mission(steps), policy), case.simulated(kind), attested=False, mode=mode)
     entries = kept(flight)
     stand_in = PayloadStandIn(flight.vehicle, apart=kind == "px4")
 
@@ -77,9 +78,12 @@ def judged(lines: Sequence[bytes], entries: Entries) -> Finding | None:
     return frames.over()
 
 
-@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
-def test_a_flight_records_what_became_of_each_command(kind: str) -> None:
-    lines, entries, stand_in, ending = flown(kind)
+@pytest.mark.parametrize(
+    ("kind", "mode"),
+    [("px4", EnforcementMode.SOFTWARE), ("ardupilot", EnforcementMode.SOFTWARE), ("px4", EnforcementMode.PROCESS)],
+)
+def test_a_flight_records_what_became_of_each_command(kind: str, mode: EnforcementMode) -> None:
+    lines, entries, stand_in, ending = flown(kind, mode)
     assert ending is Ending.COMPLETED
     events = [each for each in map(read, lines) if each.get("event", "").startswith("payload.")]
     told = [(each["event"], each["detail"]) for each in events]

@@ -300,6 +300,18 @@ def test_names_are_found_in_every_shape(name: str, text: str) -> None:
     assert search.in_page("<p>before after</p>") is None
 
 
+def test_decimal_group_of_a_digest_is_no_place() -> None:
+    search = LeftOver((), set(), lambda _: True, (473_977_000, 85_456_000))
+    groups = ["b90614d4", "1a3301a1", "b949935c", "77547e1f", "52ec8c77", "3c18f63c", "82353210"]
+
+    def shown(each: list[str]) -> str:
+        return " ".join(f"<span>{group}</span>" for group in each)
+
+    assert search.in_page(f"<p>digest</p>{shown([*groups, '00ff00ff'])}<p>more</p>") is None
+    for places in (["82353210"], ["473977000", "85456000"], groups):
+        assert search.in_page(f"<p>at</p>{shown(places)}<p>more</p>") in places
+
+
 def test_word_of_every_page_may_be_a_name(completed: Path, tmp_path: Path) -> None:
     genesis, *rest = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
     (tmp_path / "log.jsonl").write_bytes(b"".join(signed([edit(genesis, mission="timeline"), *rest])))

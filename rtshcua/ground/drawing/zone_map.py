@@ -407,9 +407,10 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
     homeward = [(on.at(*place), home) for place in _homeward(site, legs)]
     stopping = [(on.at(*begin), on.at(*end)) for begin, end in _stopping(site, legs)]
     width = max(2 * site.margins.position_error * on.scale, LEAST_BAND)
-    drawn = ((), ()) if flown is None else (flown.parts, flown.later)
-    tracks, later = ([[on.at(each.x, each.y) for each in part] for part in some] for some in drawn)
-    marks = [] if flown is None else [DrawnMark(*on.at(each.x, each.y), each.kind, each.label) for each in flown.marks]
+    if flown is None:
+        flown = FlownWay(())
+    tracks, later = ([[on.at(each.x, each.y) for each in part] for part in some] for some in (flown.parts, flown.later))
+    marks = [DrawnMark(*on.at(each.x, each.y), each.kind, each.label) for each in flown.marks]
     marks += [
         DrawnMark(*on.at(each.x, each.y), "left", f"step {each.number} leaves the airspace") for each in refused.left
     ]
@@ -424,7 +425,7 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
         later=tuple(map(points, later)),
         stops=_stops(on, shown.way, site),
         marks=tuple(marks),
-        images=() if flown is None else tuple(DrawnMark(*on.at(x, y), "image", told) for x, y, told in flown.images),
+        images=tuple(DrawnMark(*on.at(x, y), "image", told) for x, y, told in flown.images),
         lines=(line, *homeward, *(_thinned_line(each) for each in (*tracks, *later))),
     )
     return way._replace(keys=tuple(_way_keys(site, way)))

@@ -230,13 +230,13 @@ class _Proposals:
             yield from (CompletionItem(name, use.value) for name in (EMITTABLE if emits else self.dialect.commands))
             return
         if use is NameUse.MODE:
-            modes = ((name, autopilot) for autopilot, all in MODES.items() for name in all.__members__)
-            yield from (CompletionItem(name, use.value, autopilot) for name, autopilot in modes)
+            yield from _modes()
             return
         names = [token.text for token in emits or accepts_before(self.written)]
-        command = next((self.dialect.commands[name] for name in names if name in self.dialect.commands), {})
-        message = next((self.dialect.messages[name] for name in names if name in self.dialect.messages), None)
-        for name, field in command.items() if message is None else message.fields.items():
+        commands, messages = self.dialect.commands, self.dialect.messages
+        declared = [messages[name].fields for name in names if name in messages]
+        declared += [commands[name] for name in names if name in commands]
+        for name, field in declared[0].items() if declared else ():
             yield CompletionItem(name, "field", " ".join(filter(None, (field.label, field.unit))))
 
     def _parameters(self) -> Iterator[CompletionItem]:
@@ -368,6 +368,12 @@ class _Proposals:
 
 def _called(view: ProgramView, call: OpenCall) -> SkillDecl | TemplateDecl | None:
     return view.symbols.skills.get(call.name) or view.symbols.templates.get(call.name)
+
+
+def _modes() -> Iterator[CompletionItem]:
+    """The flight modes of both autopilots."""
+    for autopilot, modes in MODES.items():
+        yield from (CompletionItem(name, NameUse.MODE.value, autopilot) for name in modes.__members__)
 
 
 def _accepted_arguments(declared: SkillDecl | TemplateDecl, written: list[Token]) -> tuple[ParameterDecl, ...]:

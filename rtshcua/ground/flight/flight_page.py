@@ -37,6 +37,7 @@ from rtshcua.ground.drawing.time_charts import (
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
 from rtshcua.ground.flight import embedding
 from rtshcua.ground.flight.flight_content import LANES, DecisionView, FlightReport, SignalCurve
+from rtshcua.ground.flight.flown import TrackPoint
 from rtshcua.ground.flight.track import parts
 from rtshcua.ground.flight.units import unit_of
 from rtshcua.model.flat.zone import SHIFT, Projection
@@ -151,10 +152,7 @@ def _flown(report: FlightReport) -> FlownWay | None:
     if track is None:
         return None
     places = track.places or ((0, 0),) * len(track.points)
-    flown = []
-    for point, (x, y) in zip(track.points, places, strict=True):
-        ground = None if point.above_ground is None else point.above_home - point.above_ground
-        flown.append(FlownPlace(point.t_us, x, y, point.above_home, ground))
+    flown = [_flown_place(*each) for each in zip(track.points, places, strict=True)]
     first = sorted(report.decisions, key=_goes_on)[:_MOST_MARKS]
     marks = tuple(
         FlightMark(each.t_us, *(each.where or (0, 0)), f"{each.seq}: {_marked(each)}",
@@ -162,13 +160,20 @@ def _flown(report: FlightReport) -> FlownWay | None:
         for each in sorted(first, key=lambda each: each.t_us)
         if each.where is not None or not track.places
     )  # fmt: skip
-    images = tuple(
-        (*each.where, f"image {each.number}") for each in report.images[:_MOST_IMAGES] if each.where is not None
-    )
     apart = [tuple(flown[part.start : part.stop]) for part in parts(track.points)]
     split = [_split(each, report.log_ends_us, lambda place: place.t_us) for each in apart]
     later = tuple(tuple(each) for _, each in split if each)
-    return FlownWay(tuple(tuple(each) for each, _ in split if each), marks, images, later)
+    return FlownWay(tuple(tuple(each) for each, _ in split if each), marks, _places_of_images(report), later)
+
+
+def _flown_place(point: TrackPoint, place: tuple[int, int]) -> FlownPlace:
+    ground = None if point.above_ground is None else point.above_home - point.above_ground
+    return FlownPlace(point.t_us, *place, point.above_home, ground)
+
+
+def _places_of_images(report: FlightReport) -> tuple[tuple[int, int, str], ...]:
+    first = report.images[:_MOST_IMAGES]
+    return tuple((*each.where, f"image {each.number}") for each in first if each.where is not None)
 
 
 def _split(

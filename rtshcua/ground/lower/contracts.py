@@ -40,7 +40,7 @@ from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.ir.expression import Coordinates
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
-from rtshcua.model.ir.skills import EmitsDecl, LinkDecl, SkillDecl
+from rtshcua.model.ir.skills import EmitsDecl, LinkDecl, MotionDecl, SkillDecl
 from rtshcua.model.quantity import Dimension
 
 #: default of `grace`: how long a clause may be unknown, us
@@ -65,6 +65,14 @@ def cells_of(skill: SkillDecl) -> dict[str, int]:
         cells[parameter.name.text] = cell
         cell += 2 if parameter.type.text == "position" else 1
     return cells
+
+
+def _motion(motion: MotionDecl, cells: Mapping[str, int]) -> Motion:
+    """Lower a motion; a parameter that it does not name has cell -1."""
+    named = (motion.altitude, motion.speed, motion.time, motion.lowest)
+    altitude, speed, time, lowest = (-1 if name is None else cells[name.text] for name in named)
+    facing = Facing.ALONG if motion.facing is None else Facing.INWARD
+    return Motion(int(MotionKind[motion.kind.upper()]), altitude, speed, time, lowest, int(facing))
 
 
 class ContractLowering:
@@ -92,20 +100,12 @@ class ContractLowering:
             self._clauses(part, clauses, place, skill)
             for part, clauses in (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
         )
-        motion = skill.motion
         return Contract(
             name=skill.name.text,
             parameters=tuple(
                 self._parameter(argument, cells[name]) for name, argument in self._context.arguments(skill).items()
             ),
-            motion=Motion(
-                kind=int(MotionKind[motion.kind.upper()]),
-                altitude=-1 if motion.altitude is None else cells[motion.altitude.text],
-                speed=-1 if motion.speed is None else cells[motion.speed.text],
-                time=-1 if motion.time is None else cells[motion.time.text],
-                lowest=-1 if motion.lowest is None else cells[motion.lowest.text],
-                facing=int(Facing.ALONG if motion.facing is None else Facing.INWARD),
-            ),
+            motion=_motion(skill.motion, cells),
             timing_class=int(TimingClass[skill.timing_class.text.upper()]),
             deadline_us=skill.deadline.value,
             validity_us=skill.validity.value,

@@ -27,7 +27,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.ir.places import CameraDecl
-from rtshcua.model.ir.skills import ParameterDecl, PicturesDecl, SkillDecl
+from rtshcua.model.ir.skills import MotionDecl, ParameterDecl, PicturesDecl, SkillDecl
 from rtshcua.model.quantity import Dimension, display, micrometres
 
 _SECOND_US: Final = 1_000_000
@@ -199,8 +199,7 @@ def _ranges(proof: ProofContext, skill: SkillDecl, camera: CameraDecl) -> Iterat
     motion, pictures = skill.motion, skill.pictures
     assert motion is not None
     assert pictures is not None
-    named = None if motion.pattern is None else _parameter(skill, motion.pattern.text)
-    patterns = [DEFAULT_PATTERN] if named is None else [choice.text for choice in named.choices]
+    patterns = _patterns(skill, motion)
     speed = 0 if motion.speed is None else _ends(proof, skill, motion.speed.text)[1]
     for sideways in (False, True):
         pattern = next((each for each in patterns if (each in SIDEWAYS) == sideways), None)
@@ -217,6 +216,13 @@ def _ranges(proof: ProofContext, skill: SkillDecl, camera: CameraDecl) -> Iterat
         )  # fmt: skip
 
 
+def _patterns(skill: SkillDecl, motion: MotionDecl) -> list[str]:
+    """Return the patterns among which a step may choose."""
+    if motion.pattern is None:
+        return [DEFAULT_PATTERN]
+    return [choice.text for choice in _parameter(skill, motion.pattern.text).choices]
+
+
 def _ends(proof: ProofContext, skill: SkillDecl, name: str) -> tuple[int, int]:
     """Return the range of a parameter."""
     argument = proof.context.arguments(skill)[name]
@@ -227,23 +233,23 @@ def _parameter(skill: SkillDecl, name: str) -> ParameterDecl:
     return next(each for each in skill.parameters if each.name.text == name)
 
 
-class Limit(NamedTuple):
+class RangeEnd(NamedTuple):
     """What a fault would change: its span, and the least value that it may have."""
 
     span: Span
     least: int
 
 
-def _limit(proof: ProofContext, skill: SkillDecl, flown: SurveyRange, fault: PictureFault) -> Limit | None:
+def _limit(proof: ProofContext, skill: SkillDecl, flown: SurveyRange, fault: PictureFault) -> RangeEnd | None:
     """Return the end of the range that causes a fault, or the spacing; None if neither is written."""
     assert skill.motion is not None
     assert skill.pictures is not None
     if fault.change == "every":
-        return None if skill.pictures.every is None else Limit(skill.pictures.every.span, 0)
+        return None if skill.pictures.every is None else RangeEnd(skill.pictures.every.span, 0)
     speed = skill.motion.speed
     name = flown.seen if fault.change == "distance" else "" if speed is None else speed.text
     range = _parameter(skill, name).range if name else None
-    return None if range is None else Limit(range.high.span, _ends(proof, skill, name)[0])
+    return None if range is None else RangeEnd(range.high.span, _ends(proof, skill, name)[0])
 
 
 def _report(proof: ProofContext, skill: SkillDecl, camera: CameraDecl, flown: SurveyRange, fault: PictureFault) -> None:

@@ -147,6 +147,8 @@ class FlightSummary:
             told = f"Nothing: no command was sent to the vehicle in {lasted}"
         if self._flight.telemetry is None and self._flight.names_telemetry:
             return f"{told}. The telemetry that the log names is missing, so its way is not known."
+        if self._track is None and self._flight.telemetry is not None and self._flight.telemetry.track:
+            return f"{told}. All positions in the telemetry are later than the last record of the log."
         if self._track is None:
             return f"{told}. There is no telemetry of its way."
         highest = max(each.above_home for each in self._track.points)

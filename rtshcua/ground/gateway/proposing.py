@@ -29,6 +29,7 @@ HELD_US: Final = 10_000_000
 _ITEMS: Final = (layouts.MISSION_ITEM_INT, layouts.MISSION_ITEM)
 _NO_FLIGHT: Final = "no flight is ready yet"
 _YAW: Final = "yaw is not flown: the autopilot turns the vehicle"
+_PILOT: Final = "the pilot is in control"
 _LANDS: Final = "the vehicle is still landing"
 #: the most proposals of one client that are neither taken nor refused
 MOST_OPEN: Final = 4
@@ -188,6 +189,8 @@ class Proposing:
             return TEMPORARILY_REJECTED, _LANDS
         if self._state.seen.armed:
             return None
+        if self._control.pilots.in_control:
+            return TEMPORARILY_REJECTED, _PILOT
         flight = self._state.flight
         if flight.stage == "waiting" and flight.unready is not None:
             return TEMPORARILY_REJECTED, flight.unready
@@ -222,7 +225,7 @@ class Proposing:
     def _hindrance(self, client: ConnectedClient, steps: tuple[ProposedStep, ...], now_us: int) -> str | None:
         """Why steps cannot be taken now, although the policy may permit them."""
         if self._control.pilots.in_control:
-            return "the pilot is in control"
+            return _PILOT
         rival = self._control.outranked(client, now_us)
         if rival is not None and not all(self._control.is_safer(each.skill) for each in steps):
             return f"{rival.name} is in control"

@@ -173,6 +173,23 @@ def test_telemetry_after_the_last_record_is_shown_and_not_counted(completed: Pat
     assert abs(float(found[1]) * 1_000_000 - (ended_us - report.lasted_us)) < 1_500_000
 
 
+def test_telemetry_that_begins_after_the_last_record_is_drawn_and_counts_nothing(
+    completed: Path, tmp_path: Path
+) -> None:
+    cut_in_flight(completed, tmp_path)
+    cut = report_of(tmp_path).report
+    end_us = cut.begun_utc_us + cut.lasted_us
+    heard = tlog.read((completed / "telemetry.tlog").read_bytes())
+    later = [tlog.encode(each.at_us, each.frame) for each in heard if each.at_us > end_us]
+    (tmp_path / "telemetry.tlog").write_bytes(b"".join(later))
+    report = report_of(tmp_path).report
+    assert (report.highest, report.distance) == (None, None)
+    assert "later than the last record" in dict(report.summary)["What flew"]
+    drawn = page(report)
+    assert '"flown later"' in drawn
+    assert '"flown"' not in drawn
+
+
 def test_telemetry_after_the_last_record_is_drawn_apart(completed: Path, tmp_path: Path) -> None:
     cut_in_flight(completed, tmp_path)
     whole, cut = page(report_of(completed).report), page(report_of(tmp_path).report)

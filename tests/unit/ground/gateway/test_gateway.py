@@ -541,6 +541,19 @@ def test_nothing_that_waits_flies_once_the_pilot_is_in_control() -> None:
         control(world, 0)
 
 
+def test_nobody_arms_while_the_pilot_is_in_control() -> None:
+    """No take-off could follow."""
+    world = piloted()
+    world.ready()
+    control(world, 1)
+    actions = world.send(command_long(400, 1))
+    assert acks(actions) == [(400, 1)]
+    assert texts(actions) == ["Arming denied: the pilot is in control"]
+    control(world, 0)
+    world.wait(1_000_000)
+    assert acks(world.send(command_long(400, 1))) == [(400, 0)]
+
+
 def test_a_pilot_is_answered_and_told_who_is_in_control() -> None:
     world = piloted()
     world.client(8, "other tower", pilot=True)

@@ -1,4 +1,5 @@
 from collections.abc import Sequence
+from copy import copy
 from math import inf, nan
 from typing import Any
 
@@ -34,6 +35,7 @@ from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode
 from rtshcua.model.flat.situation import Now
 
 N, E = NORTH
+YAW = "yaw is not flown: the autopilot turns the vehicle"
 TAKEOFF, WAYPOINT, LOITER, RETURN, LAND, SPEED = 22, 16, 19, 20, 21, 178
 
 
@@ -104,6 +106,20 @@ def test_an_upload_is_checked_as_a_whole_before_it_is_acknowledged() -> None:
     actions = world.take(ProposalChecked(check.number, None))
     assert results(actions) == [(0, 0)]
     assert [each.messages for each in actions if isinstance(each, Withhold)] == [frozenset({42, 46})]
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "yaw", "asked"), [(PX4, nan, 0), (PX4, 0.0, 1), (ARDUPILOT, 0.0, 0), (ARDUPILOT, 90.0, 1)]
+)
+def test_yaw_in_the_items_of_a_mission_is_told_once_it_is_stored(autopilot: int, yaw: float, asked: int) -> None:
+    world = GatewayWorld(autopilot)
+    world.ready()
+    for refusal, said in (("refused", 0), (None, asked), (None, 0)):
+        items = mission() if autopilot == PX4 else [copy(HOME_ITEM), *mission(1)]
+        for each in items:
+            each.param4 = yaw if each.command == WAYPOINT else nan
+        (check,) = (each for each in upload(world, items) if isinstance(each, Propose))
+        assert texts(world.take(ProposalChecked(check.number, refusal))).count(YAW) == said
 
 
 def test_a_mission_that_is_refused_as_a_whole_is_not_stored() -> None:

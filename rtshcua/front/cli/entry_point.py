@@ -6,7 +6,6 @@ checks a flag that the signal sets (`front/cli/interrupts.py`, `app/fly/stop_wis
 (`stop_wishes.breakable`). This module must import nothing slow.
 """
 
-import gc
 import signal
 
 
@@ -16,6 +15,4 @@ def main() -> int:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from rtshcua.front.cli.app import main as run
 
-    code = run()
-    gc.freeze()  # the process ends: the collector need not search for cycles in all that it still holds
-    return code
+    return run()

@@ -25,7 +25,6 @@ from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.model.flat.zone import meridian
 
 # MAV_CMD that occur in plans alone
 _NAV_DELAY, _VTOL_TAKEOFF, _VTOL_LAND = 93, 84, 85
@@ -41,8 +40,6 @@ _TERRAIN: Final = (10, 11)
 _TERRAIN_HELP: Final = (
     "plan it above home or above sea: no skill follows terrain, and a fixed height would not be the same"
 )
-#: a place of takeoff that is further from home than this is told, in 1e-7 degree (some 5 m)
-_NEAR: Final = 500
 
 #: commands that do not move the vehicle, by the loss that they are
 _IGNORED: Final[Mapping[int, str]] = MappingProxyType(
@@ -220,17 +217,13 @@ class _Translating:
 
     def _tell(self, item: QgcItem) -> None:
         """The losses that depend on the policy's home."""
-        if item.command in (_TAKEOFF, _VTOL_TAKEOFF) and self._plan.is_ardupilot and self._is_elsewhere(item):
+        if item.command in (_TAKEOFF, _VTOL_TAKEOFF) and self._plan.is_ardupilot and self._elsewhere(item):
             self._losses.append(Loss("takeoff-place", item.place, command_name(item.command)))
         if _flies(item.command) and item.command not in (_LAND, _VTOL_LAND) and item.frame in SEA_FRAMES:
             self._losses.append(Loss("height-datum", item.place, f"{item.params[6]} m above sea"))
 
-    def _is_elsewhere(self, item: QgcItem) -> bool:
-        """Whether an item has a place that is not home. After a take-off there, PX4 flies to it (`mission.cpp`)."""
-        latitude, longitude = item.params[4:6]
-        if latitude is None or longitude is None or not (latitude or longitude):
-            return False
-        return _apart((degrees_e7(latitude), degrees_e7(longitude)), self._table.home) > _NEAR
+    def _elsewhere(self, item: QgcItem) -> bool:
+        return any(self._translation.is_elsewhere(each, 0) for each in self._messages(item))
 
     # ---------------------------------------------------------------- MAVLink
 
@@ -247,10 +240,6 @@ class _Translating:
         waits = params[0] if command in (WAYPOINT, _NAV_DELAY) else 0.0
         if command == WAYPOINT:
             yield whole._replace(fields=fields | {"param1": 0.0})
-        if command == _TAKEOFF and not self._plan.is_ardupilot and self._is_elsewhere(item):
-            yield whole
-            yield whole._replace(fields=fields | {"command": WAYPOINT, "param1": 0.0})
-            return
         if waits > 0:
             stays = {"command": LOITER_TIME, "x": 0, "y": 0, "z": 0.0, "param1": waits}
             yield whole._replace(fields=fields | stays)
@@ -307,11 +296,6 @@ class _Translating:
 
 def _is_vertical(item: QgcItem) -> bool:
     return item.command == _CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL)
-
-
-def _apart(one: tuple[int, int], other: tuple[int, int]) -> int:
-    """How far two places are apart, at most, in 1e-7 degree."""
-    return max(abs(one[0] - other[0]), abs(meridian(one[1], other[1]) - other[1]))
 
 
 def _written(place: tuple[int, int]) -> str:

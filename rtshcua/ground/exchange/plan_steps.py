@@ -29,7 +29,7 @@ from rtshcua.model.flat.situation import Now, State
 # MAV_CMD that occur in plans alone
 _NAV_DELAY, _VTOL_TAKEOFF, _VTOL_LAND = 93, 84, 85
 _TAKEOFF, _LAND = enums.MAV_CMD_NAV_TAKEOFF, enums.MAV_CMD_NAV_LAND
-_CHANGE_SPEED: Final = enums.MAV_CMD_DO_CHANGE_SPEED
+CHANGE_SPEED: Final = enums.MAV_CMD_DO_CHANGE_SPEED
 _HORIZONTAL: Final = (0, 1)  # SPEED_TYPE: through the air, over ground
 #: altitude modes of the planner: above terrain as it computed it, and a terrain frame; the frames that agree with a
 #: mode
@@ -42,7 +42,7 @@ _TERRAIN_HELP: Final = (
 )
 
 #: commands that do not move the vehicle, by the loss that they are
-_IGNORED: Final[Mapping[int, str]] = MappingProxyType(
+IGNORED: Final[Mapping[int, str]] = MappingProxyType(
     {
         **dict.fromkeys((203, 206, 214, 260, 530, 531, 532, 2000, 2001, 2003, 2500, 2501), "camera"),
         **dict.fromkeys((204, 205, 1000, 1001), "gimbal"),
@@ -108,9 +108,16 @@ class ImportedSteps(NamedTuple):
     not_kept: tuple[NotKept, ...]
 
 
-def plan_steps(plan: QgcPlan, table: StepTable, without: Iterable[str] = ()) -> ImportedSteps:
-    """Translate the items of a plan, without those at the places `without`."""
-    return _Translating(plan, table).steps(frozenset(without))
+def plan_steps(
+    plan: QgcPlan,
+    table: StepTable,
+    without: Iterable[str] = (),
+    after: Mapping[str, ProposedStep] = MappingProxyType({}),
+) -> ImportedSteps:
+    """Translate the items of a plan, without those at the places `without`. The steps `after` come after the flights at
+    their places, and end elsewhere.
+    """
+    return _Translating(plan, table, after).steps(frozenset(without))
 
 
 def item_losses(plan: QgcPlan) -> Iterator[Loss]:
@@ -119,18 +126,18 @@ def item_losses(plan: QgcPlan) -> Iterator[Loss]:
         yield from _losses(item, reads_yaw=not plan.is_ardupilot)
     if plan.vehicle_type not in enums.MULTIROTORS:
         yield Loss("vehicle-type", "/mission/vehicleType", f"MAV_TYPE {plan.vehicle_type}")
-    if plan.speed and not any(item.command == _CHANGE_SPEED for item in plan.items):
+    if plan.speed and not any(item.command == CHANGE_SPEED for item in plan.items):
         yield Loss("planned-speed", "/mission/hoverSpeed", f"{plan.speed:f} m/s")
 
 
 def _losses(item: QgcItem, *, reads_yaw: bool) -> Iterator[Loss]:
-    name = _IGNORED.get(item.command)
+    name = IGNORED.get(item.command)
     if name is not None:
         yield Loss(name, item.place, command_name(item.command))
         return
     if item.command in (_VTOL_TAKEOFF, _VTOL_LAND):
         yield Loss("vtol", item.place, command_name(item.command))
-    if item.command == _CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL):
+    if item.command == CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL):
         yield Loss("vertical-speed", item.place, f"{item.params[1]} m/s")
     if item.command in _REFUSED or not _flies(item.command):
         return
@@ -162,8 +169,8 @@ def _flies(command: int) -> bool:
 class _Translating:
     """The translation of one plan."""
 
-    def __init__(self, plan: QgcPlan, table: StepTable) -> None:
-        self._plan, self._table = plan, table
+    def __init__(self, plan: QgcPlan, table: StepTable, after: Mapping[str, ProposedStep]) -> None:
+        self._plan, self._table, self._after = plan, table, after
         self._autopilot = ARDUPILOT if plan.is_ardupilot else PX4
         settings = GatewaySettings(1, self._autopilot, table.policy, table.defaults, table.accepted, _no_state)
         self._translation = Translation(settings, PlannedVehicle(table.above_sea))
@@ -203,7 +210,7 @@ class _Translating:
         return None
 
     def _take(self, item: QgcItem) -> None:
-        if item.command in _IGNORED or _is_vertical(item):
+        if item.command in IGNORED or is_vertical(item):
             return
         before = len(self._made.steps)
         for message in self._messages(item):
@@ -280,7 +287,8 @@ class _Translating:
             motion = contract.motion
             to = next((text for text in step.arguments.values() if "," in text), at)
             high = step.values[motion.altitude] if motion.altitude >= 0 else height
-            if motion.kind == MotionKind.FLY and (to, high) == (at, height):
+            surveyed = self._after.get(place) if motion.kind == MotionKind.FLY else None
+            if motion.kind == MotionKind.FLY and (to, high) == (at, height) and surveyed is None:
                 continue
             at, height = to, high
             if motion.kind == MotionKind.HOME:
@@ -288,14 +296,18 @@ class _Translating:
             elif motion.kind == MotionKind.LAND:
                 height = 0
             yield ImportedStep(step, place)
+            if surveyed is not None:
+                yield ImportedStep(surveyed, place)
+                at = ""
 
     @property
     def _home_text(self) -> str:
         return _written(self._table.home)
 
 
-def _is_vertical(item: QgcItem) -> bool:
-    return item.command == _CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL)
+def is_vertical(item: QgcItem) -> bool:
+    """Whether a change of speed is one of climbs or descents."""
+    return item.command == CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL)
 
 
 def _written(place: tuple[int, int]) -> str:

@@ -33,7 +33,7 @@ from rtshcua.ground.exchange.kml_document import kml_of, read_kml
 from rtshcua.ground.exchange.kml_zones import zones_of_kml
 from rtshcua.ground.exchange.losses import LOSSES, Loss, NotKept, NotReadable, comment, grouped, left_out
 from rtshcua.ground.exchange.plan_source import MissionHeader, draft_policy, fence_zones, mission_text
-from rtshcua.ground.exchange.plan_steps import StepTable, plan_steps
+from rtshcua.ground.exchange.plan_steps import StepTable, plan_steps, without_jumps
 from rtshcua.ground.exchange.plan_surveys import CoveredSurvey, cover_survey, covered_plan
 from rtshcua.ground.exchange.qgc_reading import QgcPlan, read_plan_file
 from rtshcua.ground.exchange.qgc_surveys import NoSurvey, QgcSurvey
@@ -366,6 +366,7 @@ def _mission(
     request: ImportRequest, plan: QgcPlan, names: SourceNames, surveys: Sequence[CoveredSurvey]
 ) -> _Made | Refusal:
     """The mission, with these surveys as steps."""
+    plan = without_jumps(plan)
     policy = _drafted(request, plan, names, surveys) if request.policy is None else _given(request, plan)
     if isinstance(policy, Refusal):
         return policy

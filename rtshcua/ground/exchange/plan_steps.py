@@ -6,7 +6,7 @@ apart: a waypoint with a wait is a flight and a wait. An unset parameter (`null`
 ArduPilot.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from math import nan
 from types import MappingProxyType
@@ -55,6 +55,11 @@ IGNORED: Final[Mapping[int, str]] = MappingProxyType(
         3000: "vtol",
     }
 )
+_JUMP: Final = 177
+#: the most items of a plan whose jumps are written out
+_MOST_ITEMS: Final = 256
+#: commands that are not repeated
+_ONCE: Final = (_TAKEOFF, _LAND, _VTOL_TAKEOFF, _VTOL_LAND, enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 #: commands that no mission of this language has, and the reason
 _REFUSED: Final[Mapping[int, str]] = MappingProxyType(
     {
@@ -62,7 +67,7 @@ _REFUSED: Final[Mapping[int, str]] = MappingProxyType(
         18: "no skill flies circles",
         31: "no skill climbs in circles",
         82: "no skill flies curves between places",
-        177: "no step jumps to another; write the repeated steps in `repeat N { ... }`",
+        _JUMP: "no step jumps to another; write the repeated steps in `repeat N { ... }`",
         179: "home cannot be moved in flight: heights and the return count from it",
     }
 )
@@ -118,6 +123,34 @@ def plan_steps(
     their places, and end elsewhere.
     """
     return _Translating(plan, table, after).steps(frozenset(without))
+
+
+def without_jumps(plan: QgcPlan) -> QgcPlan:
+    """A plan with its jumps written out: the items from the target to the jump are flown again as often as it says, as
+    both autopilots do. A jump without an end, forward, over another jump, or over a take-off, a landing or a return
+    stays.
+    """
+    items: list[QgcItem] = []
+    free = 0  # the items before it are repeated already
+    for item in plan.items:
+        again = _repeated(items[free:], item) if item.command == _JUMP else []
+        if again and len(items) + len(again) <= _MOST_ITEMS:
+            items += again
+        else:
+            items.append(item)
+        if item.command == _JUMP:
+            free = len(items)
+    return plan._replace(items=tuple(items))
+
+
+def _repeated(before: Sequence[QgcItem], jump: QgcItem) -> list[QgcItem]:
+    """The items that a jump repeats, as often as it does; none if they are not written out."""
+    target, count = jump.params[0], jump.params[1]
+    begin = next((at for at, each in enumerate(before) if each.jump_id and each.jump_id == target), None)
+    if begin is None or count is None or count != count.to_integral_value() or not 0 < count <= _MOST_ITEMS:
+        return []
+    body = list(before[begin:])
+    return [] if any(each.command in _ONCE for each in body) else body * int(count)
 
 
 def item_losses(plan: QgcPlan) -> Iterator[Loss]:

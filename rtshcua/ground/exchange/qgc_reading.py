@@ -26,7 +26,7 @@ _NO_LEGS: Final = "open the plan in QGroundControl and save it again, or fly the
 class QgcItem(NamedTuple):
     """A simple item: its place in the file, the command and its seven parameters as written (None: null), the frame,
     the altitude mode (0: not given), the height that the planner shows, and whether the mission goes on by itself.
-    `of` is the kind of the complex item that it belongs to.
+    `of` is the kind of the complex item that it belongs to, `jump_id` the number by which a jump names it (0: none).
     """
 
     place: str
@@ -37,6 +37,7 @@ class QgcItem(NamedTuple):
     height: Decimal | None = None
     goes_on: bool = True
     of: str = ""
+    jump_id: int = 0
 
 
 class QgcFence(NamedTuple):
@@ -228,6 +229,7 @@ def _simple(item: dict[str, Any], place: str) -> QgcItem:
         _whole(item.get("AltitudeMode") or Number("0"), f"{place}/AltitudeMode"),
         None if height is None else _number(height, f"{place}/Altitude"),
         goes_on is not False,
+        jump_id=_whole(item.get("doJumpId") or Number("0"), f"{place}/doJumpId"),
     )
 
 

@@ -33,8 +33,10 @@ from rtshcua.ground.exchange.kml_document import kml_of, read_kml
 from rtshcua.ground.exchange.kml_zones import zones_of_kml
 from rtshcua.ground.exchange.losses import LOSSES, Loss, NotKept, NotReadable, comment, grouped, left_out
 from rtshcua.ground.exchange.plan_source import MissionHeader, draft_policy, fence_zones, mission_text
-from rtshcua.ground.exchange.plan_steps import StepTable, plan_steps
+from rtshcua.ground.exchange.plan_steps import StepTable, plan_steps, without_jumps
+from rtshcua.ground.exchange.plan_surveys import CoveredSurvey, cover_survey, covered_plan
 from rtshcua.ground.exchange.qgc_reading import QgcPlan, read_plan_file
+from rtshcua.ground.exchange.qgc_surveys import NoSurvey, QgcSurvey
 from rtshcua.ground.exchange.stock_policy import VEHICLE, GeoPoint
 from rtshcua.ground.exchange.zone_features import INSIDE, OUTSIDE, ZoneFeature, ZoneTerms, write_zones
 from rtshcua.ground.exchange.zone_source import SourceNames, place_text
@@ -51,6 +53,8 @@ PROPOSERS: Final = ("operator", "agent")
 USES: Final = (OUTSIDE, INSIDE)
 #: the packages of the extra `import`
 _EXTRA: Final = ("uas_standards", "implicitdict")
+#: errors about charge and time: the legs of a survey take no less
+_OF_CHARGE: Final = frozenset({"E0614", "E0620", "E0804", "E0809", "E0812", "E0814", "E0815"})
 #: the name of a source that is not written to a file
 _UNNAMED: Final = "imported.rts"
 SUFFIXES: Final = (".plan", ".kml", ".kmz", ".geojson", ".json")
@@ -65,7 +69,7 @@ class ImportRequest(NamedTuple):
     """A file, what is made of it (empty: what its kind usually is), the source to write (None: none), the source with
     the policy of a mission, what is left out, and who proposes a mission. Of zones: what plain areas are for, the
     lowest and the highest ground (`400..460`, in m above sea), the offset of the vehicle's clock (`+02:00`), and the
-    width of lines in m; empty where nothing is stated.
+    width of lines in m; empty where nothing is stated. `legs` keeps the planner's legs of surveys.
     """
 
     file: Path
@@ -78,6 +82,7 @@ class ImportRequest(NamedTuple):
     terrain: str = ""
     clock: str = ""
     width: str = ""
+    legs: bool = False
 
 
 class ImportedSource(NamedTuple):
@@ -139,8 +144,16 @@ def _places(found: Sequence[tuple[str, str]]) -> Iterator[str]:
         yield f"  and {len(found) - _MOST_PLACES} more"
 
 
+class _Checked(NamedTuple):
+    """A formatted text with the findings of the checker."""
+
+    text: str
+    diagnostics: tuple[Diagnostic, ...]
+    sources: Mapping[str, Source]
+
+
 class _Made(NamedTuple):
-    """A text before it is checked."""
+    """A text before it is checked; `checked` if it was checked already."""
 
     text: str
     zones: int
@@ -148,6 +161,7 @@ class _Made(NamedTuple):
     losses: tuple[Loss, ...]
     not_kept: tuple[NotKept, ...]
     rules: tuple[str, ...] = ()
+    checked: _Checked | None = None
 
 
 def import_file(request: ImportRequest) -> ImportedSource | Refusal:
@@ -252,17 +266,22 @@ def _finished(request: ImportRequest, kind: str, to: str, made: _Made | Refusal)
         return Refusal("usage", f"`--skip {unknown[0]}` names nothing that is refused", help)
     if remaining:
         return ImportedSource(kind, to, "", 0, 0, made.losses, tuple(remaining), tuple(skipped))
-    formatted = format_text(made.text)
-    text = formatted if isinstance(formatted, str) else made.text
+    checked = made.checked or _check(request, made.text)
     if request.output is not None:
-        write_new(request.output, text.encode())
+        write_new(request.output, checked.text.encode())
+    return ImportedSource(
+        kind, to, checked.text, made.zones, made.steps, made.losses, (), tuple(skipped), made.rules,
+        checked.diagnostics, checked.sources,
+    )  # fmt: skip
+
+
+def _check(request: ImportRequest, text: str) -> _Checked:
+    """Format and check a text, as the source that is to be written."""
+    formatted = format_text(text)
+    text = formatted if isinstance(formatted, str) else text
     name = _UNNAMED if request.output is None else str(request.output)
     checked = read_text(name, text)
-    found = examine(checked)
-    return ImportedSource(
-        kind, to, text, made.zones, made.steps, made.losses, (), tuple(skipped), made.rules,
-        found.diagnostics, checked.program.sources,
-    )  # fmt: skip
+    return _Checked(text, examine(checked).diagnostics, checked.program.sources)
 
 
 # ---------------------------------------------------------------- plans
@@ -292,21 +311,74 @@ def _plan_zones(request: ImportRequest, plan: QgcPlan) -> _Made | Refusal:
 
 
 def _plan_mission(request: ImportRequest, plan: QgcPlan) -> _Made | Refusal:
-    """The mission under the given policy, or under one that is made for it."""
+    """The mission under the given policy, or under one that is made for it. Surveys are steps of their own, if that
+    keeps their meaning and the checker accepts it; otherwise the planner's legs are flown.
+    """
     if not plan.items and not plan.not_kept:
         return _unread(request, "it has no mission", "`--to zones` imports its fence")
-    names = SourceNames()
-    policy = _drafted(request, plan, names) if request.policy is None else _given(request, plan)
+    names, surveys, why = SourceNames(), list[CoveredSurvey](), dict[str, str]()
+    for place, each in plan.surveys.items():
+        try:
+            surveys.append(_survey(request, plan, each, names))
+        except NoSurvey as error:
+            why[place] = str(error)
+    if surveys:
+        made = _mission(request, _with_reasons(covered_plan(plan, surveys), why), names, surveys)
+        if isinstance(made, Refusal):
+            told = made.text
+        else:
+            checked = _check(request, made.text)
+            errors = [each for each in checked.diagnostics if has_errors([each]) and each.code.id not in _OF_CHARGE]
+            if not errors:
+                return made._replace(checked=checked)
+            told = f"the checker refuses it as a step: {errors[0].message}"
+        why |= {each.place: told for each in surveys}
+    return _mission(request, _with_reasons(plan, why), SourceNames(), ())
+
+
+def _survey(request: ImportRequest, plan: QgcPlan, survey: QgcSurvey | str, names: SourceNames) -> CoveredSurvey:
+    """A survey as a step. Raises `NoSurvey`."""
+    if request.legs:
+        raise NoSurvey("as requested by `--legs`")
+    if isinstance(survey, str):
+        raise NoSurvey(survey)
+    if request.policy is not None or plan.home is None:
+        raise NoSurvey("the given policy has no skill for it")
+    return cover_survey(plan, survey, GeoPoint(*plan.home), names)
+
+
+def _with_reasons(plan: QgcPlan, why: Mapping[str, str]) -> QgcPlan:
+    """A plan that says why the legs of a survey are kept, or why it is not kept."""
+    losses = [
+        each._replace(what=f"{each.what}: {why[each.place]}")
+        if each.name == "survey-parameters" and each.place in why
+        else each
+        for each in plan.losses
+    ]
+    not_kept = [
+        each._replace(why=f"{each.why}: {why[each.place]}") if why.get(each.place, each.why) != each.why else each
+        for each in plan.not_kept
+    ]
+    return plan._replace(losses=tuple(losses), not_kept=tuple(not_kept))
+
+
+def _mission(
+    request: ImportRequest, plan: QgcPlan, names: SourceNames, surveys: Sequence[CoveredSurvey]
+) -> _Made | Refusal:
+    """The mission, with these surveys as steps."""
+    plan = without_jumps(plan)
+    policy = _drafted(request, plan, names, surveys) if request.policy is None else _given(request, plan)
     if isinstance(policy, Refusal):
         return policy
     places = frozenset(each.place for each in plan.not_kept)
-    found = plan_steps(plan, policy.table, places)
+    found = plan_steps(plan, policy.table, places, {each.place: each.step for each in surveys})
     not_kept = (*plan.not_kept, *found.not_kept)
     if not found.steps and (not not_kept or not left_out(not_kept, request.skip)[0]):
         return _unread(request, "no item of its mission flies")
     header = policy.header._replace(name=names.of(request.file.stem, "mission"), proposer=request.proposer)
     text = f"{policy.text}\n{mission_text(header, found.steps)}"
-    return _Made(text, policy.zones, len(found.steps), (*plan.losses, *policy.losses, *found.losses), not_kept)
+    lost = (*plan.losses, *policy.losses, *found.losses, *(loss for each in surveys for loss in each.losses))
+    return _Made(text, policy.zones, len(found.steps), lost, not_kept)
 
 
 class _Policy(NamedTuple):
@@ -321,11 +393,13 @@ class _Policy(NamedTuple):
     zones: int = 0
 
 
-def _drafted(request: ImportRequest, plan: QgcPlan, names: SourceNames) -> _Policy | Refusal:
+def _drafted(
+    request: ImportRequest, plan: QgcPlan, names: SourceNames, surveys: Sequence[CoveredSurvey] = ()
+) -> _Policy | Refusal:
     if plan.home is None:
         return _unread(request, "it has no planned home", "name the source of a policy with `--policy`")
     home = GeoPoint(*plan.home)
-    draft = draft_policy(plan, home, names)
+    draft = draft_policy(plan, home, names, surveys)
     text = _introduction(request) + draft.text
     name = request.output or Path(_UNNAMED)
     try:

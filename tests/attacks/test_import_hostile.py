@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reference.qgc_plans import RETURN, TAKEOFF, at, circle, fence, plan, survey
+from reference.qgc_plans import RETURN, TAKEOFF, at, circle, fence, mapped, plan, structure, survey
 from reference.zone_files import (
     CIRCLE,
     HOLE,
@@ -40,13 +40,15 @@ from rtshcua.front.cli import app
 from rtshcua.ground.exchange.losses import NotReadable
 from rtshcua.ground.exchange.plan_source import draft_policy, fence_zones, mission_text
 from rtshcua.ground.exchange.plan_steps import StepTable, plan_steps
+from rtshcua.ground.exchange.plan_surveys import cover_survey, covered_plan
 from rtshcua.ground.exchange.qgc_reading import read_plan_file
+from rtshcua.ground.exchange.qgc_surveys import NoSurvey
 from rtshcua.ground.exchange.stock_policy import GeoPoint
 from rtshcua.ground.exchange.zone_source import SourceNames
 from rtshcua.ground.language.size_limits import MAX_SIZE
 
 WHOLE = plan(
-    TAKEOFF, at(16, 2, 1, 20, 5), survey(at(16, 3, 1, 25)), RETURN,
+    TAKEOFF, at(16, 2, 1, 20, 5), survey(at(16, 3, 1, 25)), mapped(), structure(), RETURN,
     polygons=[fence()], circles=[circle(9, 9, 10)], rally=[[47.3, 8.5, 3]],
 )  # fmt: skip
 #: values in the place of others
@@ -98,7 +100,12 @@ def read_whole(table: StepTable, data: bytes) -> None:
     header = importing.MissionHeader("m", "p", 1, "v", "operator", "x.plan")
     assert mission_text(header, steps.steps).startswith("mission m under p@1 on v {\n")
     if found.home is not None:
-        draft_policy(found, GeoPoint(*found.home), SourceNames())
+        home, surveys = GeoPoint(*found.home), []
+        for each in found.surveys.values():
+            with contextlib.suppress(NoSurvey):
+                if not isinstance(each, str):
+                    surveys.append(cover_survey(found, each, home, SourceNames()))
+        draft_policy(covered_plan(found, surveys), home, SourceNames(), surveys)
 
 
 @settings(max_examples=400, deadline=None)

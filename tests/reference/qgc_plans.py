@@ -44,6 +44,42 @@ def survey(*items: dict[str, Any], kind: str = "survey") -> dict[str, Any]:
     }  # fmt: skip
 
 
+#: a camera of a survey at 40 m: a picture shows 60 m by 40 m, each 10 m a picture
+CAMERA = {
+    "CameraName": "Test 20", "SensorWidth": 13.2, "SensorHeight": 8.8, "FocalLength": 8.8, "ImageWidth": 5472,
+    "ImageHeight": 3648, "Landscape": True, "MinTriggerInterval": 1, "FrontalOverlap": 75, "SideOverlap": 70,
+    "DistanceToSurface": 40, "AdjustedFootprintSide": 18, "AdjustedFootprintFrontal": 10, "version": 2,
+}  # fmt: skip
+CORNERS = ((2, 1), (2, 10), (8, 10), (8, 1))
+
+
+def near(corners: Any) -> list[list[float]]:
+    """Places given in 1e-4 degree from home."""
+    return [[HOME[0] + north / 10_000, HOME[1] + east / 10_000] for north, east in corners]
+
+
+def mapped(kind: str = "survey", height: float = 40, trigger: float = 10, more: Any = None, **options: Any) -> Any:
+    """A survey, or a corridor scan, with a camera: `options` are those of its legs, `more` those of its item."""
+    legs = [at(16, 3, 0, height), simple(206, trigger, 0, 1), at(16, 3, 11, height), simple(206, 0),
+            at(16, 6, 11, height), simple(206, trigger, 0, 1), at(16, 6, 0, height), simple(206, 0)]  # fmt: skip
+    transects = {"version": 2, "CameraCalc": CAMERA, "Items": legs, "TurnAroundDistance": 5, **options}
+    shape = {"polygon": near(CORNERS), "angle": 45} if kind == "survey" else {
+        "polyline": near(((3, 0), (8, 2))), "CorridorWidth": 40}  # fmt: skip
+    item = {"type": "ComplexItem", "complexItemType": kind, "version": 5, "TransectStyleComplexItem": transects}
+    return item | shape | (more or {})
+
+
+def structure(corners: Any = ((5, 5), (5, 6), (5.7, 6), (5.7, 5)), camera: Any = None, **more: Any) -> dict[str, Any]:
+    """A structure scan."""
+    figures = {"DistanceToSurface": 15, "AdjustedFootprintSide": 6, "AdjustedFootprintFrontal": 10}
+    figures |= {"FrontalOverlap": 30, "MinTriggerInterval": 0.7}
+    return {
+        "type": "ComplexItem", "complexItemType": "StructureScan", "version": 3, "polygon": near(corners),
+        "EntranceAltitude": 45, "ScanBottomAlt": 5, "StructureHeight": 35, "Layers": 2, "StartFromTop": False,
+        "GimbalPitch": 0, "CameraCalc": CAMERA | figures | (camera or {}),
+    } | more  # fmt: skip
+
+
 def fence(inclusion: bool = True, corners: tuple[tuple[float, float], ...] = FENCE) -> dict[str, Any]:
     return {"inclusion": inclusion, "polygon": [list(each) for each in corners], "version": 1}
 

@@ -5,12 +5,12 @@ both.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from math import isqrt
 from typing import Final, NamedTuple
 
 from rtshcua.ground.exchange.losses import Loss, comment
 from rtshcua.ground.exchange.plan_steps import ImportedStep, flying_items
+from rtshcua.ground.exchange.plan_surveys import CoveredSurvey
 from rtshcua.ground.exchange.qgc_reading import QgcFence, QgcItem, QgcPlan, degrees_e7
 from rtshcua.ground.exchange.stock_policy import (
     CLIMB,
@@ -82,7 +82,7 @@ def _shape(fence: QgcFence) -> str:
 
 class PlanExtent(NamedTuple):
     """How far a plan flies: its farthest place from home, mm; its highest altitude above home, mm; the longest time of
-    a leg and of a wait, s; the greatest speed, mm/s; and the number of its items.
+    a leg and of a wait, s; the greatest speed, mm/s; the number of its items; and the time of its surveys, s.
     """
 
     farthest: int
@@ -91,28 +91,34 @@ class PlanExtent(NamedTuple):
     wait_s: int
     speed: int
     items: int
+    surveys_s: int = 0
 
 
-def extent_of(plan: QgcPlan, home: GeoPoint) -> PlanExtent:
-    """The extent of a plan around a home."""
+def extent_of(plan: QgcPlan, home: GeoPoint, surveys: Sequence[CoveredSurvey] = ()) -> PlanExtent:
+    """The extent of a plan around a home. Its surveys begin after the flights at their places."""
     plane = projection_at(home.latitude, home.longitude)
-    way = [(0, 0, 0)]
+    speeds = [each.params[1] or 0 for each in plan.items if each.command == enums.MAV_CMD_DO_CHANGE_SPEED]
+    slowest = min((int(each * 1000) for each in speeds if each >= 1), default=CRUISE)
+    ends = {each.place: each for each in surveys}
+    way, legs = [(0, 0, 0)], [0]
     for item in flying_items(plan):
         latitude, longitude = item.params[4:6]
         place = way[-1][:2]
         if latitude and longitude:
             place = project(plane, degrees_e7(latitude), degrees_e7(longitude))
         way.append((*place, _above_home(item, plan.home_above_sea)))
+        legs.append(_leg_s(way[-2], way[-1], slowest))
+        if item.place in ends:
+            way.append((*ends[item.place].end, ends[item.place].highest))
     waits = [each.params[0] or 0 for each in plan.items if each.command not in _NOT_WAITING]
-    speeds = [each.params[1] or 0 for each in plan.items if each.command == enums.MAV_CMD_DO_CHANGE_SPEED]
-    slowest = min((int(each * 1000) for each in speeds if each >= 1), default=CRUISE)
     return PlanExtent(
-        max(_length(x, y) for x, y, _ in way),
-        max(height for _, _, height in way),
-        max((_leg_s(*pair, slowest) for pair in pairwise(way)), default=0),
+        max((*(_length(x, y) for x, y, _ in way), *(each.farthest for each in surveys))),
+        max((*(height for _, _, height in way), *(each.highest for each in surveys))),
+        max(legs),
         int(max(waits, default=0)),
         int(max(speeds, default=0) * 1000),
-        len(way),
+        len(way) + len(surveys),
+        sum(each.seconds for each in surveys),
     )
 
 
@@ -145,10 +151,16 @@ class PolicyDraft(NamedTuple):
     losses: tuple[Loss, ...]
 
 
-def draft_policy(plan: QgcPlan, home: GeoPoint, names: SourceNames) -> PolicyDraft:
-    """A policy for a plan, with the library's vehicle and skills: it permits what the plan needs, inside its fence."""
-    extent, losses = extent_of(plan, home), []
+def draft_policy(
+    plan: QgcPlan, home: GeoPoint, names: SourceNames, surveys: Sequence[CoveredSurvey] = ()
+) -> PolicyDraft:
+    """A policy for a plan, with the library's vehicle and skills: it permits what the plan needs, inside its fence.
+    Each of its surveys has a skill.
+    """
+    extent, losses = extent_of(plan, home, surveys), []
     fence = fence_zones(plan, names)
+    skills = ", ".join(["takeoff", "goto", *(each.step.skill for each in surveys)])
+    fence = fence._replace(outside=(*fence.outside, *(each.keep_out for each in surveys if each.keep_out)))
     if not fence.inside:
         radius = -(-(extent.farthest + _ROOM_MM) // 10_000) * 10_000
         field = SourceZone(names.of("field", "field"), ("made up: around all places of the plan",),
@@ -164,15 +176,24 @@ def draft_policy(plan: QgcPlan, home: GeoPoint, names: SourceNames) -> PolicyDra
         "",
         "// The figures are those that stock PX4 and ArduCopter keep: use those of your vehicle.",
         *vehicle_lines(
-            "imported-01", home, WITHIN_MM, _RETURN_MM, plan.home_above_sea, max(15, percent(_landing_s(highest)))
+            "imported-01",
+            home,
+            WITHIN_MM,
+            max((_RETURN_MM, *(each.clear for each in surveys))),
+            plan.home_above_sea,
+            max(15, percent(_landing_s(highest))),
+            sorted({each.camera for each in surveys}),
         ),
         "",
         *(each.text() for each in fence.zones),
+        *(zone.text() for each in surveys for zone in each.zones),
+        *(f"{each.skill}\n" for each in surveys),
         "// A policy to begin with: it permits what this plan needs. Whatever no rule permits is denied.",
         f"policy {name} version 1 {{",
         f"  permit  takeoff, goto by role operator through operator, agent when altitude <= {metres(highest)}",
+        *(f"  permit  {each.step.skill} by role operator through operator, agent" for each in surveys),
         "  permit  hover, return_home, emergency_land by any",
-        "  degrade takeoff, goto, hover when battery < 25 % to return_home",
+        f"  degrade {skills}, hover when battery < 25 % to return_home",
         f"  {fence.airspace()}",
         "  contingency hover for 10 s, return_home, emergency_land",
         "}",
@@ -188,7 +209,7 @@ def _sizes(extent: PlanExtent, highest: int) -> Iterator[str]:
     fastest = min(max(extent.speed, _DEFAULT_FASTEST), _FASTEST)
     high = f"highest = {metres(highest)}, "
     # each step may wait for those before it
-    minutes = min(extent.items * (extent.leg_s + _TURN_S) // 60 + 10, _LONGEST_MIN)
+    minutes = min((extent.items * (extent.leg_s + _TURN_S) + extent.surveys_s) // 60 + 10, _LONGEST_MIN)
     short, long = (f"lifetime = {max(least, minutes)} min, " for least in (40, 60))
     leg_s = min(max(extent.leg_s, _SHORTEST_S), _LONGEST_S)
     charge = min(-(-100 * leg_s // FLIGHT_S), 80)

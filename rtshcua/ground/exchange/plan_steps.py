@@ -6,7 +6,7 @@ apart: a waypoint with a wait is a flight and a wait. An unset parameter (`null`
 ArduPilot.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from math import nan
 from types import MappingProxyType
@@ -25,12 +25,11 @@ from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now, State
-from rtshcua.model.flat.zone import meridian
 
 # MAV_CMD that occur in plans alone
 _NAV_DELAY, _VTOL_TAKEOFF, _VTOL_LAND = 93, 84, 85
 _TAKEOFF, _LAND = enums.MAV_CMD_NAV_TAKEOFF, enums.MAV_CMD_NAV_LAND
-_CHANGE_SPEED: Final = enums.MAV_CMD_DO_CHANGE_SPEED
+CHANGE_SPEED: Final = enums.MAV_CMD_DO_CHANGE_SPEED
 _HORIZONTAL: Final = (0, 1)  # SPEED_TYPE: through the air, over ground
 #: altitude modes of the planner: above terrain as it computed it, and a terrain frame; the frames that agree with a
 #: mode
@@ -41,11 +40,9 @@ _TERRAIN: Final = (10, 11)
 _TERRAIN_HELP: Final = (
     "plan it above home or above sea: no skill follows terrain, and a fixed height would not be the same"
 )
-#: a place of takeoff that is further from home than this is told, in 1e-7 degree (some 5 m)
-_NEAR: Final = 500
 
 #: commands that do not move the vehicle, by the loss that they are
-_IGNORED: Final[Mapping[int, str]] = MappingProxyType(
+IGNORED: Final[Mapping[int, str]] = MappingProxyType(
     {
         **dict.fromkeys((203, 206, 214, 260, 530, 531, 532, 2000, 2001, 2003, 2500, 2501), "camera"),
         **dict.fromkeys((204, 205, 1000, 1001), "gimbal"),
@@ -58,6 +55,11 @@ _IGNORED: Final[Mapping[int, str]] = MappingProxyType(
         3000: "vtol",
     }
 )
+_JUMP: Final = 177
+#: the most items of a plan whose jumps are written out
+_MOST_ITEMS: Final = 256
+#: commands that are not repeated
+_ONCE: Final = (_TAKEOFF, _LAND, _VTOL_TAKEOFF, _VTOL_LAND, enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 #: commands that no mission of this language has, and the reason
 _REFUSED: Final[Mapping[int, str]] = MappingProxyType(
     {
@@ -65,7 +67,7 @@ _REFUSED: Final[Mapping[int, str]] = MappingProxyType(
         18: "no skill flies circles",
         31: "no skill climbs in circles",
         82: "no skill flies curves between places",
-        177: "no step jumps to another; write the repeated steps in `repeat N { ... }`",
+        _JUMP: "no step jumps to another; write the repeated steps in `repeat N { ... }`",
         179: "home cannot be moved in flight: heights and the return count from it",
     }
 )
@@ -111,9 +113,44 @@ class ImportedSteps(NamedTuple):
     not_kept: tuple[NotKept, ...]
 
 
-def plan_steps(plan: QgcPlan, table: StepTable, without: Iterable[str] = ()) -> ImportedSteps:
-    """Translate the items of a plan, without those at the places `without`."""
-    return _Translating(plan, table).steps(frozenset(without))
+def plan_steps(
+    plan: QgcPlan,
+    table: StepTable,
+    without: Iterable[str] = (),
+    after: Mapping[str, ProposedStep] = MappingProxyType({}),
+) -> ImportedSteps:
+    """Translate the items of a plan, without those at the places `without`. The steps `after` come after the flights at
+    their places, and end elsewhere.
+    """
+    return _Translating(plan, table, after).steps(frozenset(without))
+
+
+def without_jumps(plan: QgcPlan) -> QgcPlan:
+    """A plan with its jumps written out: the items from the target to the jump are flown again as often as it says, as
+    both autopilots do. A jump without an end, forward, over another jump, or over a take-off, a landing or a return
+    stays.
+    """
+    items: list[QgcItem] = []
+    free = 0  # the items before it are repeated already
+    for item in plan.items:
+        again = _repeated(items[free:], item) if item.command == _JUMP else []
+        if again and len(items) + len(again) <= _MOST_ITEMS:
+            items += again
+        else:
+            items.append(item)
+        if item.command == _JUMP:
+            free = len(items)
+    return plan._replace(items=tuple(items))
+
+
+def _repeated(before: Sequence[QgcItem], jump: QgcItem) -> list[QgcItem]:
+    """The items that a jump repeats, as often as it does; none if they are not written out."""
+    target, count = jump.params[0], jump.params[1]
+    begin = next((at for at, each in enumerate(before) if each.jump_id and each.jump_id == target), None)
+    if begin is None or count is None or count != count.to_integral_value() or not 0 < count <= _MOST_ITEMS:
+        return []
+    body = list(before[begin:])
+    return [] if any(each.command in _ONCE for each in body) else body * int(count)
 
 
 def item_losses(plan: QgcPlan) -> Iterator[Loss]:
@@ -122,18 +159,18 @@ def item_losses(plan: QgcPlan) -> Iterator[Loss]:
         yield from _losses(item, reads_yaw=not plan.is_ardupilot)
     if plan.vehicle_type not in enums.MULTIROTORS:
         yield Loss("vehicle-type", "/mission/vehicleType", f"MAV_TYPE {plan.vehicle_type}")
-    if plan.speed and not any(item.command == _CHANGE_SPEED for item in plan.items):
+    if plan.speed and not any(item.command == CHANGE_SPEED for item in plan.items):
         yield Loss("planned-speed", "/mission/hoverSpeed", f"{plan.speed:f} m/s")
 
 
 def _losses(item: QgcItem, *, reads_yaw: bool) -> Iterator[Loss]:
-    name = _IGNORED.get(item.command)
+    name = IGNORED.get(item.command)
     if name is not None:
         yield Loss(name, item.place, command_name(item.command))
         return
     if item.command in (_VTOL_TAKEOFF, _VTOL_LAND):
         yield Loss("vtol", item.place, command_name(item.command))
-    if item.command == _CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL):
+    if item.command == CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL):
         yield Loss("vertical-speed", item.place, f"{item.params[1]} m/s")
     if item.command in _REFUSED or not _flies(item.command):
         return
@@ -165,8 +202,8 @@ def _flies(command: int) -> bool:
 class _Translating:
     """The translation of one plan."""
 
-    def __init__(self, plan: QgcPlan, table: StepTable) -> None:
-        self._plan, self._table = plan, table
+    def __init__(self, plan: QgcPlan, table: StepTable, after: Mapping[str, ProposedStep]) -> None:
+        self._plan, self._table, self._after = plan, table, after
         self._autopilot = ARDUPILOT if plan.is_ardupilot else PX4
         settings = GatewaySettings(1, self._autopilot, table.policy, table.defaults, table.accepted, _no_state)
         self._translation = Translation(settings, PlannedVehicle(table.above_sea))
@@ -206,7 +243,7 @@ class _Translating:
         return None
 
     def _take(self, item: QgcItem) -> None:
-        if item.command in _IGNORED or _is_vertical(item):
+        if item.command in IGNORED or is_vertical(item):
             return
         before = len(self._made.steps)
         for message in self._messages(item):
@@ -220,17 +257,13 @@ class _Translating:
 
     def _tell(self, item: QgcItem) -> None:
         """The losses that depend on the policy's home."""
-        if item.command in (_TAKEOFF, _VTOL_TAKEOFF) and self._plan.is_ardupilot and self._is_elsewhere(item):
+        if item.command in (_TAKEOFF, _VTOL_TAKEOFF) and self._plan.is_ardupilot and self._elsewhere(item):
             self._losses.append(Loss("takeoff-place", item.place, command_name(item.command)))
         if _flies(item.command) and item.command not in (_LAND, _VTOL_LAND) and item.frame in SEA_FRAMES:
             self._losses.append(Loss("height-datum", item.place, f"{item.params[6]} m above sea"))
 
-    def _is_elsewhere(self, item: QgcItem) -> bool:
-        """Whether an item has a place that is not home. After a take-off there, PX4 flies to it (`mission.cpp`)."""
-        latitude, longitude = item.params[4:6]
-        if latitude is None or longitude is None or not (latitude or longitude):
-            return False
-        return _apart((degrees_e7(latitude), degrees_e7(longitude)), self._table.home) > _NEAR
+    def _elsewhere(self, item: QgcItem) -> bool:
+        return any(self._translation.is_elsewhere(each, 0) for each in self._messages(item))
 
     # ---------------------------------------------------------------- MAVLink
 
@@ -247,10 +280,6 @@ class _Translating:
         waits = params[0] if command in (WAYPOINT, _NAV_DELAY) else 0.0
         if command == WAYPOINT:
             yield whole._replace(fields=fields | {"param1": 0.0})
-        if command == _TAKEOFF and not self._plan.is_ardupilot and self._is_elsewhere(item):
-            yield whole
-            yield whole._replace(fields=fields | {"command": WAYPOINT, "param1": 0.0})
-            return
         if waits > 0:
             stays = {"command": LOITER_TIME, "x": 0, "y": 0, "z": 0.0, "param1": waits}
             yield whole._replace(fields=fields | stays)
@@ -291,7 +320,8 @@ class _Translating:
             motion = contract.motion
             to = next((text for text in step.arguments.values() if "," in text), at)
             high = step.values[motion.altitude] if motion.altitude >= 0 else height
-            if motion.kind == MotionKind.FLY and (to, high) == (at, height):
+            surveyed = self._after.get(place) if motion.kind == MotionKind.FLY else None
+            if motion.kind == MotionKind.FLY and (to, high) == (at, height) and surveyed is None:
                 continue
             at, height = to, high
             if motion.kind == MotionKind.HOME:
@@ -299,19 +329,18 @@ class _Translating:
             elif motion.kind == MotionKind.LAND:
                 height = 0
             yield ImportedStep(step, place)
+            if surveyed is not None:
+                yield ImportedStep(surveyed, place)
+                at = ""
 
     @property
     def _home_text(self) -> str:
         return _written(self._table.home)
 
 
-def _is_vertical(item: QgcItem) -> bool:
-    return item.command == _CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL)
-
-
-def _apart(one: tuple[int, int], other: tuple[int, int]) -> int:
-    """How far two places are apart, at most, in 1e-7 degree."""
-    return max(abs(one[0] - other[0]), abs(meridian(one[1], other[1]) - other[1]))
+def is_vertical(item: QgcItem) -> bool:
+    """Whether a change of speed is one of climbs or descents."""
+    return item.command == CHANGE_SPEED and item.params[0] not in (None, *_HORIZONTAL)
 
 
 def _written(place: tuple[int, int]) -> str:

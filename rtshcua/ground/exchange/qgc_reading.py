@@ -4,12 +4,13 @@ Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/pla
 read from the items that the planner made of it. What each item means is the subject of `plan_steps`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any, Final, NamedTuple
 
 from rtshcua.ground.checker.geojson import GeoPolygon, NoArea, Number, polygon_of, read_json
 from rtshcua.ground.exchange.losses import Loss, NotKept, NotReadable
+from rtshcua.ground.exchange.qgc_surveys import MOST_SURVEYS, TRANSECTS, NoSurvey, QgcSurvey, read_survey
 from rtshcua.mavlink import dialect
 
 ARDUPILOT_PLAN: Final = 3  # MAV_AUTOPILOT_ARDUPILOTMEGA
@@ -19,15 +20,13 @@ _FENCE_VERSIONS: Final = (1, 2)
 #: what a number of a plan may be at most: more is no degree, metre or second
 _MOST: Final = Decimal(10) ** 9
 _PARAMETERS: Final = 7
-#: the complex items whose planned legs are in the file
-_TRANSECTS: Final = ("survey", "CorridorScan")
 _NO_LEGS: Final = "open the plan in QGroundControl and save it again, or fly the legs as waypoints"
 
 
 class QgcItem(NamedTuple):
     """A simple item: its place in the file, the command and its seven parameters as written (None: null), the frame,
     the altitude mode (0: not given), the height that the planner shows, and whether the mission goes on by itself.
-    `of` is the kind of the complex item that it belongs to.
+    `of` is the kind of the complex item that it belongs to, `jump_id` the number by which a jump names it (0: none).
     """
 
     place: str
@@ -38,6 +37,7 @@ class QgcItem(NamedTuple):
     height: Decimal | None = None
     goes_on: bool = True
     of: str = ""
+    jump_id: int = 0
 
 
 class QgcFence(NamedTuple):
@@ -64,6 +64,8 @@ class QgcPlan(NamedTuple):
     fences: tuple[QgcFence, ...]
     losses: tuple[Loss, ...]
     not_kept: tuple[NotKept, ...]
+    #: what is known of the surveys besides their legs, or why nothing is, by their places
+    surveys: Mapping[str, QgcSurvey | str] = {}
 
     @property
     def is_ardupilot(self) -> bool:
@@ -95,6 +97,7 @@ class _Reading:
         self._tree = tree
         self._losses: list[Loss] = []
         self._not_kept: list[NotKept] = []
+        self._surveys: dict[str, QgcSurvey | str] = {}
 
     def plan(self) -> QgcPlan:
         version = _whole(self._tree.get("version", Number("1")), "/version")
@@ -125,6 +128,7 @@ class _Reading:
             fences,
             tuple(self._losses),
             tuple(self._not_kept),
+            self._surveys,
         )
 
     # ---------------------------------------------------------------- mission
@@ -145,10 +149,16 @@ class _Reading:
         kind = item.get("complexItemType")
         if not isinstance(kind, str) or not kind.strip():
             raise NotReadable(f"`{place}/complexItemType` is not a name")
+        try:
+            if len(self._surveys) >= MOST_SURVEYS:
+                raise NoSurvey(f"the plan has more than {MOST_SURVEYS} surveys")
+            self._surveys[place] = read_survey(item, place)
+        except NoSurvey as error:
+            self._surveys[place] = str(error)
         legs = item.get("TransectStyleComplexItem")
         made = legs.get("Items") if isinstance(legs, dict) else None
-        if kind not in _TRANSECTS or not made:
-            why = "its legs are not in the file" if kind in _TRANSECTS else "no skill flies it"
+        if kind not in TRANSECTS or not made:
+            why = "its legs are not in the file" if kind in TRANSECTS else "no skill flies it"
             self._not_kept.append(NotKept(kind, place, why, _NO_LEGS))
             return
         self._losses.append(Loss("survey-parameters", place, kind))
@@ -219,6 +229,7 @@ def _simple(item: dict[str, Any], place: str) -> QgcItem:
         _whole(item.get("AltitudeMode") or Number("0"), f"{place}/AltitudeMode"),
         None if height is None else _number(height, f"{place}/Altitude"),
         goes_on is not False,
+        jump_id=_whole(item.get("doJumpId") or Number("0"), f"{place}/doJumpId"),
     )
 
 

@@ -4,7 +4,7 @@ The vehicle's figures are those that stock PX4 and ArduCopter keep (docs/flying/
 and `rtshcua import` write such policies; each is a source like any other, to be read and changed.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from rtshcua.ground.exchange.zone_source import metres, place_text
@@ -28,9 +28,17 @@ class GeoPoint(NamedTuple):
 
 
 def vehicle_lines(
-    identity: str, home: GeoPoint, within_mm: int, return_mm: int, above_sea: int | None = None, reserve: int = 15
+    identity: str,
+    home: GeoPoint,
+    within_mm: int,
+    return_mm: int,
+    above_sea: int | None = None,
+    reserve: int = 15,
+    cameras: Sequence[str] = (),
 ) -> Iterator[str]:
-    """The vehicle at a home; `above_sea` is its height in mm, if that is known, `reserve` the reserve in percent."""
+    """The vehicle at a home; `above_sea` is its height in mm, if that is known, `reserve` the reserve in percent; the
+    `cameras` are lines of their own.
+    """
     yield f"vehicle {VEHICLE} {{"
     yield f'  identity "{identity}"'
     yield f"  home     {place_text(*home)} within {metres(within_mm)}"
@@ -47,6 +55,7 @@ def vehicle_lines(
     yield f"  return   at {metres(return_mm)}"
     yield f"  reserve  {reserve} %"
     yield "  without  wind.speed, obstacle.distance, link.quality"
+    yield from (f"  {each}" for each in cameras)
     yield "}"
 
 

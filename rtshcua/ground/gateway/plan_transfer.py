@@ -15,7 +15,7 @@ from rtshcua.ground.gateway.accepted import ITEM
 from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.interface import ProposedStep
-from rtshcua.ground.gateway.translation import Translation, Untranslated
+from rtshcua.ground.gateway.translation import Translation, Untranslated, has_place
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.command_results import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
 from rtshcua.mavlink.modes import ARDUPILOT
@@ -255,7 +255,8 @@ def read_plan(
 ) -> UploadedPlan | RefusedPlan:
     """The steps of a mission's items. DO_CHANGE_SPEED is no step: it sets the speed of the flights after it.
 
-    An item that stays or lands at a place becomes a flight to the place, and then the step.
+    An item that stays or lands at a place becomes a flight to the place, and then the step. A take-off at a place is
+    followed by a flight to it on PX4.
     """
     made = PlanSteps(translation, shadows, now_us)
     for number, item in enumerate(items):
@@ -291,7 +292,10 @@ class PlanSteps:
             if not isnan(hold) and hold != 0:
                 return RefusedPlan(MISSION_INVALID_PARAM1, "waits at a waypoint are refused: use NAV_LOITER_TIME")
             return self._append(number, item)
-        if _has_place(item) and self._translation.row(ITEM, command, item) is None:
+        if command == enums.MAV_CMD_NAV_TAKEOFF and self._translation.flies_after_takeoff(item, self._now_us):
+            there = item._replace(fields=item.fields | {"command": WAYPOINT, "param1": 0.0})
+            return self._append(number, item) or self._append(number, there)
+        if has_place(item) and self._translation.row(ITEM, command, item) is None:
             there = item._replace(fields=item.fields | {"x": 0, "y": 0})
             row = self._translation.row(ITEM, command, there)
             contract = None if row is None else self._translation.contract(row.skill)
@@ -332,12 +336,6 @@ class PlanSteps:
         self.steps.append(step)
         self.item_of.append(number)
         return None
-
-
-def _has_place(item: Received) -> bool:
-    """Whether an item names a place: latitude and longitude 0, or NaN, mean none."""
-    x, y = item.number("x"), item.number("y")
-    return not (isnan(x) or isnan(y) or (x, y) in ((0, 0), (enums.NO_PLACE, enums.NO_PLACE)))
 
 
 def _in_form(item: Received, *, whole: bool) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.mavlink.quantise import quantise
 from rtshcua.model.flat.contract import PLACE, QUANTITY, Contract, MotionKind, Parameter
 from rtshcua.model.flat.limits import MAX_VALUE
-from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, project
+from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, meridian, project
 from rtshcua.model.quantity import Dimension
 
 _AUTOPILOTS: Final = {PX4: "px4", ARDUPILOT: "ardupilot"}
@@ -34,6 +34,8 @@ _WHOLE: Final = frozenset({layouts.COMMAND_INT, layouts.MISSION_ITEM_INT, layout
 _PLACED: Final = {"param5": "x", "param6": "y", "param7": "z"}
 _WITH_XYZ: Final = frozenset({layouts.COMMAND_INT, layouts.MISSION_ITEM_INT, layouts.MISSION_ITEM})
 _POLE: Final = 900_000_000
+#: a place of take-off that is further away than this is another place, in 1e-7 degree (some 5 m)
+_NEAR: Final = 500
 #: NAV_WAYPOINT, NAV_LOITER_UNLIM, NAV_LAND, NAV_TAKEOFF, DO_REPOSITION: `param4` is the yaw, or NaN
 _WITH_YAW: Final = frozenset({16, 17, 21, 22, 192})
 #: POSITION_TARGET_TYPEMASK_YAW_IGNORE and _YAW_RATE_IGNORE
@@ -138,6 +140,24 @@ class Translation:
             else:
                 return Untranslated(DENIED, f"{row.skill}: {parameter.name} is missing")
         return ProposedStep(row.skill, texts, tuple(cells))
+
+    def is_elsewhere(self, item: Received, now_us: int) -> bool:
+        """Whether an item has a place that is not where the vehicle stands; where that is not known, not home."""
+        if not has_place(item):
+            return False
+        here, plane = self._seen.here(now_us) if self._seen.on_ground else None, self._policy.projection
+        at = (plane.latitude, plane.longitude) if here is None else (int(here.fields["lat"]), int(here.fields["lon"]))
+        scale = 1 if item.message in _WHOLE else 10_000_000
+        latitude, longitude = (quantise(item.number(name), scale, 1) for name in ("x", "y"))
+        if latitude is None or longitude is None:
+            return True
+        return max(abs(latitude - at[0]), abs(meridian(longitude, at[1]) - at[1])) > _NEAR
+
+    def flies_after_takeoff(self, item: Received, now_us: int) -> bool:
+        """Whether the vehicle flies to the place of a take-off item after the climb: PX4 does (`mission.cpp`),
+        ArduCopter ignores the place.
+        """
+        return self._autopilot == PX4 and self.is_elsewhere(item, now_us)
 
     def takeoffs_to(self, altitude: int | None = None) -> list[ProposedStep | None]:
         """The take-off to a height in mm above home, by default the least of its contract, by each skill of the table
@@ -250,6 +270,12 @@ class Translation:
             return 0
         home = self._seen.home_amsl
         return Untranslated(TEMPORARILY_REJECTED, "the height of home is unknown yet") if home is None else home
+
+
+def has_place(item: Received) -> bool:
+    """Whether an item names a place: latitude and longitude 0, or NaN, mean none."""
+    x, y = item.number("x"), item.number("y")
+    return not (isnan(x) or isnan(y) or (x, y) in ((0, 0), (enums.NO_PLACE, enums.NO_PLACE)))
 
 
 def _quantity(parameter: Parameter, value: int) -> Argument:

@@ -21,6 +21,7 @@ __all__ = ["MAX_LENGTH", "mutated", "one", "seeds"]
 def seeds() -> Iterable[bytes]:
     values = (
         qgc_plans.plan(qgc_plans.TAKEOFF, qgc_plans.at(16, 2, 1, 20, 5), polygons=[qgc_plans.fence()]),
+        qgc_plans.plan(qgc_plans.TAKEOFF, qgc_plans.mapped(), qgc_plans.structure()),
         zone_files.ed269(), zone_files.ed318(), zone_files.faa(), zone_files.geojson({"name": "field"}),
         zone_files.openaip((2500, 1, 1), (0, 1, 0)),
     )  # fmt: skip

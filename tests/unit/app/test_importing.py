@@ -210,6 +210,28 @@ def test_an_unset_parameter_is_a_default_on_px4_and_zero_on_ardupilot() -> None:
     assert low.code is ExitCode.DIAGNOSTICS, "0 m is no altitude to take off to"
 
 
+def test_a_jump_back_repeats_the_items_before_it_as_often_as_it_says() -> None:
+    a, b = at(16, 2, 1, 20, doJumpId=2), at(16, 3, 1, 25, doJumpId=3)
+    found = imported(plan(TAKEOFF, a, b, simple(177, 2, 2, doJumpId=4), RETURN, firmware=ARDUPILOT))
+    assert found.code is ExitCode.OK
+    places = [each.partition(",")[0].removeprefix("goto(target = ") for each in steps(found)[1:-1]]
+    assert places == ["47.3979400 N", "47.3980400 N"] * 3
+
+
+#: jumps that are not written out: forward, unknown, without an end, of a part, to nothing, over a take-off, too often
+@pytest.mark.parametrize("jump", [(4, 1), (9, 1), (2, -1), (2, 0), (2, 1.5), (None, 1), (2, None), (1, 1), (2, 255)])
+def test_other_jumps_are_not_kept(jump: tuple[float | None, float | None]) -> None:
+    items = at(22, 0, 0, 20, doJumpId=1), at(16, 2, 1, 20, doJumpId=2), simple(177, *jump, doJumpId=3)
+    found = imported(plan(*items, at(16, 3, 1, 25, doJumpId=4), RETURN))
+    assert [each.name for each in found.not_kept] == ["DO_JUMP"]
+
+
+def test_a_jump_over_another_jump_is_not_kept() -> None:
+    items = at(16, 2, 1, 20, doJumpId=2), at(16, 3, 1, 25, doJumpId=3), simple(177, 3, 1), at(16, 4, 1, 25, doJumpId=5)
+    found = imported(plan(TAKEOFF, *items, simple(177, 2, 1), RETURN))
+    assert [each.place for each in found.not_kept] == ["/mission/items/5"]
+
+
 def test_a_heading_is_a_loss_only_where_the_autopilot_reads_it() -> None:
     turned = at(16, 2, 1, 20, 0, 0, 0, 90)
     assert "yaw" in lost(imported(plan(TAKEOFF, turned, RETURN, firmware=PX4)))

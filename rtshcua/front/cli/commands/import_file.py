@@ -41,6 +41,9 @@ def import_file(
     ] = "",
     clock: Annotated[str, typer.Option(metavar="OFFSET", help="the fixed offset of the vehicle's clock: +02:00")] = "",
     width: Annotated[str, typer.Option(metavar="METRES", help="the width of the corridors along lines, in m")] = "",
+    legs: Annotated[
+        bool, typer.Option("--legs", help="keep the planned legs of surveys, instead of steps with pictures")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
     """Turn a plan of QGroundControl into a source with its mission or fence, and KML, GeoJSON or official zones into
@@ -54,7 +57,7 @@ def import_file(
     written; 2 wrong command line; 3 the file is missing, malformed or too large.
     """
     findings = Findings(json=as_json)
-    request = ImportRequest(file, to, output, policy, tuple(skip or ()), proposer, use, terrain, clock, width)
+    request = ImportRequest(file, to, output, policy, tuple(skip or ()), proposer, use, terrain, clock, width, legs)
     found = service.import_file(request)
     if isinstance(found, Refusal):
         return findings.end(found)

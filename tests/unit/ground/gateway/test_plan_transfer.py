@@ -305,6 +305,40 @@ def test_a_place_of_landing_is_reached_at_the_height_of_the_last_step_that_had_o
         assert meaning(item(int(autopilot == ARDUPILOT), LAND, **there), autopilot=autopilot)[0] == 5
 
 
+def test_after_a_take_off_at_a_place_px4_flies_there_and_arducopter_does_not() -> None:
+    for frame, height in ((6, 15), (0, 503)):
+        there = item(0, TAKEOFF, x=N, y=E, z=height, frame=frame)
+        assert meaning(there) == [("takeoff", {"altitude": "15 m"}), ("goto", THERE)]
+        assert meaning(there, autopilot=ARDUPILOT) == [("takeoff", {"altitude": "15 m"})]
+    floats = mavlink.MAVLink_mission_item_message(SYSTEM, 1, 0, 3, TAKEOFF, 0, 1, 0, 0, 0, 0, N / 1e7, E / 1e7, 15, 0)
+    assert [skill for skill, _ in meaning(floats)] == ["takeoff", "goto"]
+    for x, y in ((0, 0), (2**31 - 1, 2**31 - 1), (HOME_LATITUDE + 500, HOME_LONGITUDE - 500)):
+        assert meaning(item(0, TAKEOFF, x=x, y=y, z=15)) == [("takeoff", {"altitude": "15 m"})], "no other place"
+    assert len(meaning(item(0, TAKEOFF, x=HOME_LATITUDE, y=HOME_LONGITUDE - 501, z=15))) == 2
+
+
+def test_a_place_of_take_off_is_compared_with_where_the_vehicle_stands() -> None:
+    world = GatewayWorld(PX4)
+    world.ready()
+    world.vehicle(mavlink.MAVLink_global_position_int_message(0, N, E, 488_000, 0, 0, 0, 0, 0))
+    for place, expected in (((N, E), ["takeoff"]), ((HOME_LATITUDE, HOME_LONGITUDE), ["takeoff", "goto"])):
+        actions = upload(world, [item(0, TAKEOFF, x=place[0], y=place[1], z=15)])
+        assert [step.skill for step in steps(actions)] == expected
+
+
+def test_items_of_a_take_off_elsewhere_are_reported_as_one() -> None:
+    world = GatewayWorld(PX4)
+    world.ready()
+    stored(world, [item(0, TAKEOFF, x=N, y=E, z=15), item(1, RETURN)])
+    world.accept(world.send(command_long(300)))
+    seen = states(world.dispatch(0))
+    for step in range(3):
+        seen += states(world.line(type="effect", event="succeeded", kind=0, step=step))
+        if step < 2:
+            seen += states(world.dispatch(step + 1))
+    assert seen == [("current", 0, 3), ("reached", 0, 0), ("current", 1, 3), ("reached", 1, 0), ("current", 1, 5)]
+
+
 def test_slot_0_of_ardupilot_is_home() -> None:
     assert meaning(item(0, WAYPOINT, x=N, y=E, z=15), autopilot=ARDUPILOT) == [("goto", THERE)]
     assert meaning(autopilot=ARDUPILOT) == (5, "mission refused: the mission has no item that flies")

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.writing import write_new
@@ -19,7 +19,7 @@ from rtshcua.diagnostics.kinds import ARCHIVE, ED269, GEOJSON, KML, PLAN, recogn
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import listed, nearest
-from rtshcua.ground.checker.geojson import NoArea, read_json
+from rtshcua.ground.checker.geojson import NoArea, read_json, refuse_unread
 from rtshcua.ground.exchange.geojson_features import (
     features_of,
     is_ed269,
@@ -408,7 +408,16 @@ def _imported_json(request: ImportRequest, terms: ZoneTerms, data: bytes) -> Imp
             raise
         help = "run `pip install '.[import]'` in the checkout"
         return Refusal("input", f"the package `{error.name}` is required and not installed", help)
-    return _imported_zones(request, terms, kind, found, losses, ())
+    return _imported_zones(request, terms, kind, found, losses, tuple(_of_the_whole(tree)) if kind == "geojson" else ())
+
+
+def _of_the_whole(tree: Any) -> Iterator[NotKept]:
+    """The heights and times that a collection states for all of its features."""
+    try:
+        refuse_unread({name: value for name, value in tree.items() if name not in ("features", "items")})
+    except NoArea as error:
+        if tree.get("type") == "FeatureCollection":
+            yield NotKept("collection", "/", error.message, error.help or "")
 
 
 def _imported_zones(

@@ -33,8 +33,8 @@ STATUS: Final = "CAMERA_CAPTURE_STATUS"
 OF_AUTOPILOT: Final = frozenset({CAPTURED, FEEDBACK, STATUS, "GPS_RAW_INT"})
 OF_CAMERA: Final = frozenset({CAPTURED, STATUS, "HEARTBEAT", "COMMAND_ACK"})
 
-#: how many cameras are observed
-MOST_CAMERAS: Final = 4
+#: how many cameras are observed: all that there can be, so that made-up ones keep no real one out
+MOST_CAMERAS: Final = len(CAMERAS) + 1
 #: how many restarts of an index are followed; later reports of that camera are left out
 MOST_SERIES: Final = 100
 #: how many images of a series are recognised by their time when they are reported again
@@ -333,7 +333,7 @@ class ImageObserver:
             camera = self._camera(AUTOPILOT, now_us)
             if camera is not None:
                 camera.baseline = True
-        for camera in self._cameras.values():
+        for camera in sorted(self._cameras.values(), key=lambda each: each.until_us):  # each in its turn
             if now_us >= camera.due_us:
                 unsettled = camera.series.first is None
                 camera.unanswered += unsettled

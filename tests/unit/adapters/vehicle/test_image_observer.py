@@ -348,10 +348,16 @@ def test_known_images_are_forgotten_in_the_end() -> None:
     assert w.hear(captured(3)) == [], "an old one is no restart"
 
 
-def test_only_so_many_cameras_are_followed() -> None:
+def test_made_up_cameras_keep_no_real_one_out() -> None:
+    """Every camera that can be is followed, and each is asked in its turn, whatever the others lack."""
     w = Watched()
-    taken = [len(w.hear(captured(0), component)) for component in range(100, 106)]
-    assert sum(taken) == images.MOST_CAMERAS
+    for component in range(105, 99, -1):
+        w.hear(status(0), component, after_us=1)
+        assert len(w.hear(captured(1_000, at=1), component, after_us=1)) == 1
+    assert [len(w.hear(fed_back(1), 1))] == [1]
+    assert len(w.observer._cameras) == images.MOST_CAMERAS
+    asked = [to for _ in range(60) for to, number, _ in w.asks(after_us=images.REQUEST_US) if number == 263]
+    assert {asked.count(component) for component in range(100, 106)} == {10}
 
 
 @pytest.mark.parametrize("seed", range(6))

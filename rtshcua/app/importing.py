@@ -295,8 +295,7 @@ def _plan_mission(request: ImportRequest, plan: QgcPlan) -> _Made | Refusal:
     """The mission under the given policy, or under one that is made for it."""
     if not plan.items and not plan.not_kept:
         return _unread(request, "it has no mission", "`--to zones` imports its fence")
-    names = SourceNames()
-    policy = _drafted(request, plan, names) if request.policy is None else _given(request, plan)
+    policy = _drafted(request, plan, SourceNames()) if request.policy is None else _given(request, plan)
     if isinstance(policy, Refusal):
         return policy
     places = frozenset(each.place for each in plan.not_kept)
@@ -304,19 +303,20 @@ def _plan_mission(request: ImportRequest, plan: QgcPlan) -> _Made | Refusal:
     not_kept = (*plan.not_kept, *found.not_kept)
     if not found.steps and (not not_kept or not left_out(not_kept, request.skip)[0]):
         return _unread(request, "no item of its mission flies")
-    header = policy.header._replace(name=names.of(request.file.stem, "mission"), proposer=request.proposer)
+    header = policy.header._replace(name=policy.names.of(request.file.stem, "mission"), proposer=request.proposer)
     text = f"{policy.text}\n{mission_text(header, found.steps)}"
     return _Made(text, policy.zones, len(found.steps), (*plan.losses, *policy.losses, *found.losses), not_kept)
 
 
 class _Policy(NamedTuple):
-    """The beginning of a mission's source, what it names, how items are read, and the losses that come with the
-    policy.
+    """The beginning of a mission's source, what it names, how items are read, the names that are free beside those of
+    the policy, and the losses that come with the policy.
     """
 
     text: str
     header: MissionHeader
     table: StepTable
+    names: SourceNames
     losses: tuple[Loss, ...]
     zones: int = 0
 
@@ -333,7 +333,8 @@ def _drafted(request: ImportRequest, plan: QgcPlan, names: SourceNames) -> _Poli
     except NoPolicy as error:
         return _unread(request, f"no policy can be made for it: {error}", "name the source of a policy with `--policy`")
     header = MissionHeader("", draft.name, 1, VEHICLE, "", request.file.name)
-    return _Policy(text, header, _table(missions), draft.losses, text.count("\nzone "))
+    taken = SourceNames(missions.names)
+    return _Policy(text, header, _table(missions), taken, draft.losses, text.count("\nzone "))
 
 
 def _given(request: ImportRequest, plan: QgcPlan) -> _Policy | Refusal:
@@ -352,7 +353,8 @@ def _given(request: ImportRequest, plan: QgcPlan) -> _Policy | Refusal:
     table = _table(missions)
     if plan.home is not None and plan.home != table.home:
         losses.append(Loss("planned-home", "/mission/plannedHomePosition", place_text(*plan.home)))
-    return _Policy(f'import "{path}"\n\n{_introduction(request)}', header, table, tuple(losses))
+    text = f'import "{path}"\n\n{_introduction(request)}'
+    return _Policy(text, header, table, SourceNames(missions.names), tuple(losses))
 
 
 def _table(missions: Missions) -> StepTable:

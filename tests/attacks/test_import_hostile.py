@@ -147,6 +147,16 @@ def test_a_hostile_name_of_a_file_is_shown_harmlessly(tmp_path: Path) -> None:
     assert not [each for each in found.diagnostics if each.code.id.startswith("E01")], "one comment, one string"
 
 
+@pytest.mark.parametrize("name", ["copter", "goto", "battery", "field"])
+def test_the_name_of_a_file_takes_no_name_of_the_policy(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{name}.plan"
+    path.write_text(json.dumps(WHOLE), encoding="utf-8")
+    found = import_file(ImportRequest(path, skip=("all",)))
+    assert isinstance(found, ImportedSource)
+    assert not has_errors(found.diagnostics), found.diagnostics
+    assert f"mission {name}" in found.text
+
+
 # ---------------------------------------------------------------- zones
 
 BOMB = '<!DOCTYPE k [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><kml>&b;</kml>'

@@ -155,3 +155,15 @@ def test_the_ends_of_many_steps_are_bounded() -> None:
     of.close()
     stops = [frame(2_501, each, 0, nan, nan, 0, 0, nan) for each in range(1, 33)]
     assert [passed(of, each) for each in stops] == [0] * 23 + [1] * 9, "the latest of them"
+
+
+def test_a_camera_is_of_the_vehicle_that_was_heard() -> None:
+    """Before any vehicle was heard, a heartbeat of the system 0 is of none."""
+    of = FrameSession()
+    of.observe(Codec(0, 105).pack(mavlink.MAVLink_heartbeat_message(30, 8, 0, 0, 0, 3)))
+    of.observe(AUTOPILOT.pack(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 0, 3)))
+    of.observe(CAMERA.pack(mavlink.MAVLink_heartbeat_message(30, 8, 0, 0, 0, 3)))
+    shot = payload.emission(2_000, 0, 0, ONE, 0, 0, 0, NAN)
+    declared = payload_of(payload.contract((shot,)), payload.ARGUMENTS, 0, payload.policy())
+    of.open(Command(7, "look", MotionKind.HOLD, (), (), 20_000, 0, payload=declared, not_after_us=AT))
+    assert [passed(of, frame(2_000, 0, 0, 1, 0, 0, 0, nan, to=each)) for each in (105, 100)] == [0, 1]

@@ -103,7 +103,7 @@ EXPORT uint32_t rt_test_about(uint32_t step, const int64_t now[3], int64_t *out)
 static rt_replacement test_replacement;
 static rt_approvals test_approvals;
 static uint8_t test_missions[RT_MAX_REPLACEMENTS + 1][RT_DIGEST_BYTES];
-static rt_bytes test_replaced[256];
+static rt_bytes test_replaced[4096];
 static rt_flight test_flight;
 
 /* A flight of the last opened bundle. */

@@ -48,7 +48,7 @@ void rt_gate_observe(rt_gate *gate, rt_bytes octets, int64_t now_us) {
     if (!rt_read_frame(octets, &heard))
         return;
     if (heard.component != RT_MAV_COMP_ID_AUTOPILOT1) {
-        if (heard.message == RT_MSG_HEARTBEAT && heard.system == gate->system)
+        if (heard.message == RT_MSG_HEARTBEAT && gate->system != 0 && heard.system == gate->system)
             rt_payload_hear(&gate->payload, &heard);
         return;
     }

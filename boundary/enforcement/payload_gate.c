@@ -181,40 +181,55 @@ static bool passes(rt_sendings *sendings, uint8_t confirmation, int64_t now_us) 
     return true;
 }
 
-/* The place of a command that ends something; RT_ENDINGS for any other. */
-static uint32_t ending_at(uint16_t command) {
-    switch (command) {
-    case RT_MAV_CMD_IMAGE_STOP_CAPTURE: return 0;
-    case RT_MAV_CMD_VIDEO_STOP_CAPTURE: return 1;
-    case RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST: return 2;
-    case RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: return 3;
-    default: return RT_ENDINGS;
-    }
-}
-
-/* A command passed: what it begins may be ended, and what it ends has been. */
-static void begun(rt_payload_gate *gate, const rt_frame *frame) {
+/* The command that ends what a frame begins; false if it begins nothing that goes on. */
+static bool ending_of(const rt_frame *frame, rt_ending *ending) {
     const uint32_t one = rt_u32(frame, RT_COMMAND_LONG_PARAM1), three = rt_u32(frame, RT_COMMAND_LONG_PARAM3),
                    four = rt_u32(frame, RT_COMMAND_LONG_PARAM4), seven = rt_u32(frame, RT_COMMAND_LONG_PARAM7);
     const uint32_t keep = rt_nearest_bits(-1, 1), give_back = rt_nearest_bits(-3, 1);
-    const rt_ending endings[RT_ENDINGS] = {
-        {{one, RT_NAN, RT_NAN, RT_NAN, 0, 0, RT_NAN}, frame->target_component, 1 + RT_RETRIES},
-        {{one, three, RT_NAN, RT_NAN, 0, 0, RT_NAN}, frame->target_component, 1 + RT_RETRIES},
-        {{0, 0, 0, four, 0, 0, 0}, frame->target_component, 1 + RT_RETRIES},
-        {{give_back, give_back, keep, keep, 0, 0, seven}, frame->target_component, 1 + RT_RETRIES},
-    };
-    const uint16_t command = rt_u16(frame, RT_COMMAND_LONG_COMMAND);
-    uint32_t begins = RT_ENDINGS;
-    if (command == RT_MAV_CMD_IMAGE_START_CAPTURE && three != rt_nearest_bits(1, 1)) begins = 0;
-    if (command == RT_MAV_CMD_VIDEO_START_CAPTURE) begins = 1;
-    if (command == RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST && one != 0) begins = 2;
-    if (command == RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE && one != give_back) begins = 3;
-    if (begins < RT_ENDINGS) {
-        gate->endings[begins] = endings[begins];
-        return;
+    const uint8_t to = frame->target_component;
+    switch (rt_u16(frame, RT_COMMAND_LONG_COMMAND)) {
+    case RT_MAV_CMD_IMAGE_START_CAPTURE:
+        *ending = (rt_ending){RT_MAV_CMD_IMAGE_STOP_CAPTURE, {one, RT_NAN, RT_NAN, RT_NAN, 0, 0, RT_NAN}, to, 1 + RT_RETRIES};
+        return three != rt_nearest_bits(1, 1);
+    case RT_MAV_CMD_VIDEO_START_CAPTURE:
+        *ending = (rt_ending){RT_MAV_CMD_VIDEO_STOP_CAPTURE, {one, three, RT_NAN, RT_NAN, 0, 0, RT_NAN}, to, 1 + RT_RETRIES};
+        return true;
+    case RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST:
+        *ending = (rt_ending){RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST, {0, 0, 0, four, 0, 0, 0}, to, 1 + RT_RETRIES};
+        return one != 0;
+    case RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
+        *ending = (rt_ending){RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, {give_back, give_back, keep, keep, 0, 0, seven}, to, 1 + RT_RETRIES};
+        return one != give_back;
+    default:
+        return false;
     }
-    const uint32_t ends = ending_at(command);
-    if (ends < RT_ENDINGS && gate->endings[ends].component == frame->target_component) gate->endings[ends].left = 0;
+}
+
+static void forget(rt_payload_gate *gate, uint32_t at) {
+    memmove(&gate->endings[at], &gate->endings[at + 1], (gate->ending_count - at - 1) * sizeof gate->endings[0]);
+    gate->ending_count--;
+}
+
+static bool same_ending(const rt_ending *one, const rt_ending *other) {
+    for (uint32_t at = 0; at < 7; at++)
+        if (!same_number(one->numbers[at], other->numbers[at])) return false;
+    return one->command == other->command && one->component == other->component;
+}
+
+/* A command passed: what it begins may be ended, and what it ends has been. A first parameter of 0 ends all of a kind. */
+static void begun(rt_payload_gate *gate, const rt_frame *frame) {
+    const uint16_t command = rt_u16(frame, RT_COMMAND_LONG_COMMAND);
+    const uint32_t one = rt_u32(frame, RT_COMMAND_LONG_PARAM1);
+    rt_ending ending;
+    const bool begins = ending_of(frame, &ending);
+    for (uint32_t at = gate->ending_count; at-- > 0;) {
+        const rt_ending *each = &gate->endings[at];
+        const bool ended = each->command == command && each->component == frame->target_component && (one == 0 || same_number(one, each->numbers[0]));
+        if (begins ? same_ending(each, &ending) : ended) forget(gate, at);
+    }
+    if (!begins) return;
+    if (gate->ending_count == RT_MOST_ENDINGS) forget(gate, 0);
+    gate->endings[gate->ending_count++] = ending;
 }
 
 rt_refusal rt_payload_refuse(rt_payload_gate *gate, const rt_frame *frame, int64_t now_us, uint8_t autopilot, bool home_known,
@@ -232,10 +247,13 @@ rt_refusal rt_payload_refuse(rt_payload_gate *gate, const rt_frame *frame, int64
             found = "frame/too-often";
         }
     }
-    const uint32_t at = ending_at(rt_u16(frame, RT_COMMAND_LONG_COMMAND));
-    if (at == RT_ENDINGS) return found;
-    rt_ending *ending = &gate->endings[at];
-    if (ending->left == 0 || frame->target_component != ending->component || !same_numbers(frame, ending->numbers, 7)) return found;
-    ending->left--;
-    return NULL;
+    for (uint32_t at = 0; at < gate->ending_count; at++) {
+        rt_ending *ending = &gate->endings[at];
+        if (ending->command != rt_u16(frame, RT_COMMAND_LONG_COMMAND) || ending->component != frame->target_component ||
+            !same_numbers(frame, ending->numbers, 7))
+            continue;
+        if (--ending->left == 0) forget(gate, at);
+        return NULL;
+    }
+    return found;
 }

@@ -6,7 +6,7 @@
 #include "mavlink/framing.h"
 
 #define RT_RETRIES 3
-#define RT_ENDINGS 4 /* kinds of commands that end what another one began */
+#define RT_MOST_ENDINGS (1 + RT_MAX_EMISSIONS) /* how many commands may be left that end what others began: of a whole step */
 
 /* How often a declared command was sent. */
 typedef struct {
@@ -17,6 +17,7 @@ typedef struct {
 
 /* The command that ends what another one began: to which component, and how often it may still be sent. */
 typedef struct {
+    uint16_t command;
     uint32_t numbers[7];
     uint8_t component;
     uint32_t left;
@@ -26,7 +27,8 @@ typedef struct {
     rt_sendings open[1 + RT_MAX_EMISSIONS]; /* what the present step may send; the first one may take control of a gimbal */
     uint32_t count;
     rt_list servos;
-    rt_ending endings[RT_ENDINGS];
+    rt_ending endings[RT_MOST_ENDINGS]; /* the oldest first */
+    uint32_t ending_count;
     uint8_t camera, gimbal; /* the components that were heard, 0 before */
 } rt_payload_gate;
 

@@ -48,7 +48,8 @@ static bool same_contract(const rt_contract *a, const rt_contract *b) {
            a->timing_class == b->timing_class && a->deadline_us == b->deadline_us && a->validity_us == b->validity_us &&
            rt_same_list(a->phases, b->phases) && a->duration_us == b->duration_us && a->grace_us == b->grace_us &&
            same_clauses(a->require, b->require) && same_clauses(a->assume, b->assume) && same_clauses(a->maintain, b->maintain) &&
-           same_links(a->fallback, b->fallback) && a->energy == b->energy && rt_same_list(a->record, b->record) && rt_same_list(a->reads, b->reads);
+           same_links(a->fallback, b->fallback) && a->energy == b->energy && rt_same_list(a->record, b->record) && rt_same_list(a->reads, b->reads) &&
+           rt_same_list(a->emits, b->emits);
 }
 
 /* The content of an invocation without its name, its time of issue and its source position; `phases` masks the phases in which it is

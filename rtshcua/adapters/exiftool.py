@@ -61,11 +61,15 @@ def _run(program: str, lines: Sequence[str], files: int) -> str:
     """The standard output of a call."""
     if any("\n" in line or "\r" in line for line in lines):
         raise ExifToolError("an argument has a line break")
+    try:
+        given = "".join(f"{line}\n" for line in lines).encode()
+    except UnicodeEncodeError:
+        raise ExifToolError("the name of a file or of its folder is not UTF-8") from None
     kept = {name: value for name, value in os.environ.items() if name not in _CODE} | {"LC_ALL": "C"}
     try:
         done = subprocess.run(
-            [program, "-config", "", "-@", "-"], input="".join(f"{line}\n" for line in lines).encode(),
-            capture_output=True, env=kept, timeout=PATIENCE + EACH * files, check=False,
+            [program, "-config", "", "-@", "-"], input=given, capture_output=True, env=kept,
+            timeout=PATIENCE + EACH * files, check=False,
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
         raise ExifToolError(str(error)[:_MOST_SAID]) from None

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.writing import write_new
@@ -19,7 +19,7 @@ from rtshcua.diagnostics.kinds import ARCHIVE, ED269, GEOJSON, KML, PLAN, recogn
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Source
 from rtshcua.diagnostics.suggest import listed, nearest
-from rtshcua.ground.checker.geojson import NoArea, read_json
+from rtshcua.ground.checker.geojson import NoArea, read_json, refuse_unread
 from rtshcua.ground.exchange.geojson_features import (
     features_of,
     is_ed269,
@@ -375,20 +375,21 @@ def _mission(
     not_kept = (*plan.not_kept, *found.not_kept)
     if not found.steps and (not not_kept or not left_out(not_kept, request.skip)[0]):
         return _unread(request, "no item of its mission flies")
-    header = policy.header._replace(name=names.of(request.file.stem, "mission"), proposer=request.proposer)
+    header = policy.header._replace(name=policy.names.of(request.file.stem, "mission"), proposer=request.proposer)
     text = f"{policy.text}\n{mission_text(header, found.steps)}"
     lost = (*plan.losses, *policy.losses, *found.losses, *(loss for each in surveys for loss in each.losses))
     return _Made(text, policy.zones, len(found.steps), lost, not_kept)
 
 
 class _Policy(NamedTuple):
-    """The beginning of a mission's source, what it names, how items are read, and the losses that come with the
-    policy.
+    """The beginning of a mission's source, what it names, how items are read, the names that are free beside those of
+    the policy, and the losses that come with the policy.
     """
 
     text: str
     header: MissionHeader
     table: StepTable
+    names: SourceNames
     losses: tuple[Loss, ...]
     zones: int = 0
 
@@ -407,7 +408,8 @@ def _drafted(
     except NoPolicy as error:
         return _unread(request, f"no policy can be made for it: {error}", "name the source of a policy with `--policy`")
     header = MissionHeader("", draft.name, 1, VEHICLE, "", request.file.name)
-    return _Policy(text, header, _table(missions), draft.losses, text.count("\nzone "))
+    taken = SourceNames(missions.names)
+    return _Policy(text, header, _table(missions), taken, draft.losses, text.count("\nzone "))
 
 
 def _given(request: ImportRequest, plan: QgcPlan) -> _Policy | Refusal:
@@ -426,7 +428,8 @@ def _given(request: ImportRequest, plan: QgcPlan) -> _Policy | Refusal:
     table = _table(missions)
     if plan.home is not None and plan.home != table.home:
         losses.append(Loss("planned-home", "/mission/plannedHomePosition", place_text(*plan.home)))
-    return _Policy(f'import "{path}"\n\n{_introduction(request)}', header, table, tuple(losses))
+    text = f'import "{path}"\n\n{_introduction(request)}'
+    return _Policy(text, header, table, SourceNames(missions.names), tuple(losses))
 
 
 def _table(missions: Missions) -> StepTable:
@@ -482,7 +485,16 @@ def _imported_json(request: ImportRequest, terms: ZoneTerms, data: bytes) -> Imp
             raise
         help = "run `pip install '.[import]'` in the checkout"
         return Refusal("input", f"the package `{error.name}` is required and not installed", help)
-    return _imported_zones(request, terms, kind, found, losses, ())
+    return _imported_zones(request, terms, kind, found, losses, tuple(_of_the_whole(tree)) if kind == "geojson" else ())
+
+
+def _of_the_whole(tree: Any) -> Iterator[NotKept]:
+    """The heights and times that a collection states for all of its features."""
+    try:
+        refuse_unread({name: value for name, value in tree.items() if name not in ("features", "items")})
+    except NoArea as error:
+        if tree.get("type") == "FeatureCollection":
+            yield NotKept("collection", "/", error.message, error.help or "")
 
 
 def _imported_zones(

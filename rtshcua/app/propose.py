@@ -72,6 +72,11 @@ class Missions:
         """The policy, lowered for its vehicle."""
         return self.lowered.policy
 
+    @property
+    def names(self) -> frozenset[str]:
+        """The names that the policy's sources and their imports declare."""
+        return frozenset(self._context.symbols.declared)
+
     def defaults(self) -> dict[str, dict[str, tuple[int, ...]]]:
         """The default of each parameter that has one, by skill and name, in the cells of an invocation."""
         context, found = self._context, dict[str, dict[str, tuple[int, ...]]]()

@@ -54,7 +54,7 @@ class Planner:
 
     __slots__ = (
         "_altitude", "_distance", "_error", "_heights", "_kind", "_last", "_leg", "_levelled", "_levels", "_near",
-        "_path", "_sweep",
+        "_path", "_sweep", "_whole",
     )  # fmt: skip
 
     def __init__(
@@ -68,7 +68,8 @@ class Planner:
         self._heights = heights
         self._path = HOME if kind == MotionKind.HOME else path
         self._error: Box = (-position_error, -position_error, position_error, position_error)
-        self._sweep = Sweep(self._path, self._error) if self._path and not heights else None
+        self._whole = Sweep(self._path, self._error) if self._path else None
+        self._sweep = None if heights else self._whole
         self._levels = levels(self._path, heights, self._error)
         self._levelled: dict[tuple[int, int], PlaceSet] = {}
         self._distance = max((distance(*self._path[at : at + 2]) for at in range(0, len(self._path), 2)), default=0)
@@ -114,7 +115,7 @@ class Planner:
         """The path at the heights of its points, which keeps its answers."""
         fixed = self._levelled.get((located, gap))
         if fixed is None:
-            fixed = self._levelled[located, gap] = PlaceSet(self._levels, located, gap)
+            fixed = self._levelled[located, gap] = PlaceSet(self._levels, located, gap, whole=self._whole)
         return fixed
 
     def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Sweep, Span]:

@@ -208,17 +208,19 @@ Part: TypeAlias = tuple[Sweep, int, int]
 class PlaceSet:
     """A set of places: the union of its parts, of which there is at least one. `located` and `high` say whether
     position and height may be missing; either may suffice to show that the places are outside a zone. `fixed` is
-    another set that belongs to it, with the same gaps: its answers stay the same for many sets.
+    another set that belongs to it, with the same gaps: its answers stay the same for many sets. `whole` is the path
+    whose legs the parts are, one after the other.
 
     It also caches each zone's answer, so that an unchanged planned volume is not compared again.
     """
 
-    __slots__ = ("_answers", "_bounds", "_fixed", "_own", "high", "located", "parts")
+    __slots__ = ("_answers", "_bounds", "_fixed", "_own", "_whole", "high", "located", "parts")
 
     def __init__(
-        self, parts: tuple[Part, ...], located: int = PRESENT, high: int = PRESENT, fixed: "PlaceSet | None" = None
-    ) -> None:
-        self._own, self._fixed = parts, fixed
+        self, parts: tuple[Part, ...], located: int = PRESENT, high: int = PRESENT, fixed: "PlaceSet | None" = None,
+        whole: Sweep | None = None,
+    ) -> None:  # fmt: skip
+        self._own, self._fixed, self._whole = parts, fixed, whole
         self.parts: tuple[Part, ...] = parts if fixed is None else parts + fixed.parts
         self.located, self.high = located, high
         self._answers: dict[int, Truth] = {}
@@ -236,6 +238,8 @@ class PlaceSet:
         return answer
 
     def _inside(self, zone: PreparedZone) -> Truth:
+        if self._whole is not None:
+            return self._along(zone, self._whole.within(zone))
         truth, located = 0 if self._fixed is None else self._fixed.inside(zone), self.located
         for sweep, low, high in self._own:
             vertical = zone.between(low, high, self.high)
@@ -245,6 +249,25 @@ class PlaceSet:
                 truth |= AND[vertical][UNKNOWN]
             else:
                 truth |= AND[vertical][sweep.within(zone) | (UNKNOWN if located else 0)]
+        return truth
+
+    def _along(self, zone: PreparedZone, whole: Truth) -> Truth:
+        """The same for the legs of a path, which may be thousands. Where all of the path is on one side, so is each
+        leg; elsewhere their answers are not cached, as that of this set is.
+        """
+        mixed, gap = whole == TRUE | FALSE, UNKNOWN if self.located else 0
+        most = TRUE | FALSE | (UNKNOWN if self.located or self.high else 0)
+        truth = 0
+        for sweep, low, high in self._own:
+            vertical = zone.between(low, high, self.high)
+            if vertical == FALSE:
+                truth |= FALSE
+            elif self.located == ABSENT:
+                truth |= AND[vertical][UNKNOWN]
+            else:
+                truth |= AND[vertical][(zone.along(sweep.path, sweep.box) if mixed else whole) | gap]
+            if truth == most:
+                break
         return truth
 
 

@@ -155,6 +155,13 @@ class IndexSet:
         if at <= last:
             yield at, last
 
+    def last_missing(self, first: int, last: int) -> int | None:
+        """The largest integer from `first` to `last` that is not in it; None if all are."""
+        at = self._before(last)
+        if at >= 0 and last <= self._ranges[at][1]:
+            last = self._ranges[at][0] - 1  # neighbours are joined
+        return last if last >= first else None
+
     def _before(self, index: int) -> int:
         """The place of the last range that begins at or before an integer; -1 for none."""
         return bisect_right(self._ranges, index, key=lambda each: each[0]) - 1

@@ -5,6 +5,7 @@ import copy
 import io
 import json
 import socket
+import warnings
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,6 +35,7 @@ from reference.zone_files import write as zone_file
 from rtshcua.app import importing
 from rtshcua.app.gateway.outlines import read_outline
 from rtshcua.app.importing import ImportedSource, ImportRequest, import_file
+from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import app
@@ -152,11 +154,22 @@ def test_a_hostile_name_of_a_file_is_shown_harmlessly(tmp_path: Path) -> None:
     assert not [each for each in found.diagnostics if each.code.id.startswith("E01")], "one comment, one string"
 
 
+@pytest.mark.parametrize("name", ["copter", "goto", "battery", "field"])
+def test_the_name_of_a_file_takes_no_name_of_the_policy(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{name}.plan"
+    path.write_text(json.dumps(WHOLE), encoding="utf-8")
+    found = import_file(ImportRequest(path, skip=("all",)))
+    assert isinstance(found, ImportedSource)
+    assert not has_errors(found.diagnostics), found.diagnostics
+    assert f"mission {name}" in found.text
+
+
 # ---------------------------------------------------------------- zones
 
 BOMB = '<!DOCTYPE k [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><kml>&b;</kml>'
 EXTERNAL = '<!DOCTYPE k [<!ENTITY x SYSTEM "file:///etc/passwd">]><kml><Document><name>&x;</name></Document></kml>'
 DEEP = "<kml>" + "<Folder>" * 200_000
+RING = "<LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47</coordinates></LinearRing>"
 BAD_KML: dict[str, bytes] = {
     "entities": BOMB.encode(),
     "another file": EXTERNAL.encode(),
@@ -168,6 +181,12 @@ BAD_KML: dict[str, bytes] = {
     "a huge number": kml(mark(polygon().replace("8.544,", "1e999,"))).encode(),
     "a long number": kml(mark(polygon().replace("8.544,", "8" * 5_000 + ","))).encode(),
     "no outline": kml(mark("<Polygon/>")).encode(),
+    "two outer rings": kml(mark(polygon().replace("</outer", f"{RING}</outer"))).encode(),
+    "a hole alone": kml(
+        mark(polygon(hole=True).replace("<LinearRing>", "<Ring>", 1).replace("</LinearRing>", "</Ring>", 1))
+    ).encode(),
+    "two lists of positions": kml(mark(polygon().replace("</coordinates>", "</coordinates><coordinates/>"))).encode(),
+    "an element among positions": kml(mark(polygon().replace("</coordinates>", "<b/></coordinates>"))).encode(),
     "many placemarks": kml("<Placemark/>" * 10_001).encode(),
     "no area": kml(mark("")).encode(),
 }
@@ -207,11 +226,21 @@ def _many() -> bytes:
     return made.getvalue()
 
 
+def _twice() -> bytes:
+    """An archive with two documents of one name: readers differ in which one they read."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive, warnings.catch_warnings(action="ignore"):
+        for name in ("north", "south"):
+            archive.writestr("doc.kml", kml(mark(polygon(), name)))
+    return made.getvalue()
+
+
 ARCHIVES: dict[str, Any] = {
     "bomb": _bomb,
     "lying": _lying,
     "many": _many,
     "empty": kmz,
+    "twice": _twice,
     "no document": lambda: kmz(a_txt=b"x"),
     "cut": lambda: kmz(doc_kml=kml(mark(polygon())).encode())[:-30],
     "broken": lambda: kmz(doc_kml=kml(mark(polygon())).encode() * 9).replace(b"\x00\x00", b"\xff\x00", 2),
@@ -278,6 +307,18 @@ def test_zones_with_other_values_are_read_or_refused(change: tuple[str, tuple[An
     assert not isinstance(terms, Refusal)
     with contextlib.suppress(NotReadable):
         importing._imported_json(request, terms, json.dumps(tree).encode())
+
+
+@pytest.mark.parametrize(
+    "said", [True, 5, 1e300, {"a": "b"}, [["x"], 1], "a\n// b\u2028zone x = circle(0 N, 0 E, 1 m)"]
+)
+def test_conditions_of_any_form_are_one_comment(said: Any, tmp_path: Path) -> None:
+    data = json.dumps(ed269(restriction="CONDITIONAL", restrictionConditions=said)).encode()
+    found = import_file(ImportRequest(zone_file(tmp_path, data, "zones.json"), terrain="400..460"))
+    assert isinstance(found, ImportedSource)
+    assert [line.split(" ")[1] for line in found.text.splitlines() if line.startswith("zone ")] != ["x"]
+    assert found.text.count("\nzone ") == 1
+    assert not has_errors(found.diagnostics)
 
 
 @pytest.mark.parametrize("number", range(len(NOT_A_PLAN)))

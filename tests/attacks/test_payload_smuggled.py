@@ -129,3 +129,41 @@ def test_a_pilots_camera_is_not_stopped_by_a_runtime_that_began_nothing() -> Non
     assert passed(of, frame(2_000, 0, 0, 1, 0, 0, 0, nan)) == 1
     of.close()
     assert passed(of, frame(2_001, 0, nan, nan, nan, 0, 0, nan), frame(1_001, -3, -3, -1, -1), frame(206)) == 0
+
+
+def test_each_of_several_videos_is_ended_where_it_was_begun() -> None:
+    """A heartbeat of another camera, a video of another component or another number leave the ends of the others."""
+    videos = [payload.emission(2_500, nearest_bits(each, 1), to=to) for each in (1, 2) for to in (Addressee.VEHICLE, 1)]
+    of = gate(*videos)
+    places = [(each, to) for each in (1, 2) for to in (1, 100)]
+    assert passed(of, *(frame(2_500, each, to=to) for each, to in places)) == 4
+    of.observe(Codec(1, 101).pack(mavlink.MAVLink_heartbeat_message(30, 8, 0, 0, 0, 3)))
+    of.close()
+    for each, to in places:
+        stops = [frame(2_501, each, 0, nan, nan, 0, 0, nan, to=to, again=again) for again in range(6)]
+        assert passed(of, *stops) == 4
+        assert passed(of, *(frame(2_501, each, 0, nan, nan, 0, 0, nan, to=other) for other in (0, 101, 154))) == 0
+
+
+def test_the_ends_of_many_steps_are_bounded() -> None:
+    of = gate()
+    for step in range(4):
+        videos = [payload.emission(2_500, nearest_bits(8 * step + each, 1)) for each in range(1, 9)]
+        declared = payload_of(payload.contract(tuple(videos)), payload.ARGUMENTS, 0, payload.policy())
+        of.open(Command(8 + step, "look", MotionKind.HOLD, (), (), 20_000, 0, payload=declared, not_after_us=AT))
+        assert passed(of, *(frame(2_500, 8 * step + each) for each in range(1, 9))) == 8
+    of.close()
+    stops = [frame(2_501, each, 0, nan, nan, 0, 0, nan) for each in range(1, 33)]
+    assert [passed(of, each) for each in stops] == [0] * 23 + [1] * 9, "the latest of them"
+
+
+def test_a_camera_is_of_the_vehicle_that_was_heard() -> None:
+    """Before any vehicle was heard, a heartbeat of the system 0 is of none."""
+    of = FrameSession()
+    of.observe(Codec(0, 105).pack(mavlink.MAVLink_heartbeat_message(30, 8, 0, 0, 0, 3)))
+    of.observe(AUTOPILOT.pack(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 0, 3)))
+    of.observe(CAMERA.pack(mavlink.MAVLink_heartbeat_message(30, 8, 0, 0, 0, 3)))
+    shot = payload.emission(2_000, 0, 0, ONE, 0, 0, 0, NAN)
+    declared = payload_of(payload.contract((shot,)), payload.ARGUMENTS, 0, payload.policy())
+    of.open(Command(7, "look", MotionKind.HOLD, (), (), 20_000, 0, payload=declared, not_after_us=AT))
+    assert [passed(of, frame(2_000, 0, 0, 1, 0, 0, 0, nan, to=each)) for each in (105, 100)] == [0, 1]

@@ -126,7 +126,7 @@ def compare(boundary: ctypes.CDLL, seed: int) -> int:
         pack(
             m.MAVLink_heartbeat_message(random.choice((30, 26, 18)), 8, 0, 0, 0, 3),
             each,
-            random.choice((SYSTEM,) * 5 + (4,)),
+            random.choice((SYSTEM,) * 5 + (4, 0)),
         )
         for each in (100, 154, 171, 101, 99)
     ]

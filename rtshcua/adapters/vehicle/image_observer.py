@@ -33,8 +33,8 @@ STATUS: Final = "CAMERA_CAPTURE_STATUS"
 OF_AUTOPILOT: Final = frozenset({CAPTURED, FEEDBACK, STATUS, "GPS_RAW_INT"})
 OF_CAMERA: Final = frozenset({CAPTURED, STATUS, "HEARTBEAT", "COMMAND_ACK"})
 
-#: how many cameras are observed
-MOST_CAMERAS: Final = 4
+#: how many cameras are observed: all that there can be, so that made-up ones keep no real one out
+MOST_CAMERAS: Final = len(CAMERAS) + 1
 #: how many restarts of an index are followed; later reports of that camera are left out
 MOST_SERIES: Final = 100
 #: how many images of a series are recognised by their time when they are reported again
@@ -61,6 +61,7 @@ ACCURACY_US: Final = 2_000_000
 _MOST_E7: Final = (900_000_000, 1_800_000_000)
 _MOST_UTC_US: Final = 1 << 53
 _NAME: Final = compile(r"[A-Za-z0-9._-]{1,64}")
+_MOST_METRES: Final = 1_000_000
 _UNIT: Final = 1e-2  # the greatest error of the length of a quaternion
 _UPRIGHT: Final = 1e-4
 
@@ -97,6 +98,7 @@ class _Camera:
     boot_ms: int = 0  # the latest time on its clock
     completed: int = 0  # how many pictures ArduPilot has counted
     unanswered: int = 0  # how often it was asked before anything was known
+    restarts: int = 0
     deaf: bool = False  # it has restarted too often
     baseline: bool = False  # the next CAMERA_FEEDBACK may be of a picture from before
 
@@ -170,7 +172,7 @@ class ImageObserver:
         """
         camera = self._camera(component, now_us) if component in CAMERAS else None
         count, boot_ms = message.image_count, message.time_boot_ms
-        if camera is None or count < 0:
+        if camera is None or camera.deaf or count < 0:
             return
         series = camera.series
         restarted = boot_ms < camera.boot_ms - REORDERED_MS
@@ -222,9 +224,9 @@ class ImageObserver:
             return []
         self._see(series, index, (0, utc_us))
         latitude, longitude = _place(message.lat, message.lng)
-        above_sea = None if latitude is None else quantise(float(message.alt_msl), 1_000, 1)
+        above_sea = None if latitude is None else _height(message.alt_msl)
         detail = ImageDetail(
-            above_home_mm=None if above_sea is None else quantise(float(message.alt_rel), 1_000, 1),
+            above_home_mm=None if above_sea is None else _height(message.alt_rel),
             above_sea_mm=above_sea, asked=0, attitude="vehicle", camera=component, file="", index=index,
             latitude=latitude, longitude=longitude, pitch_cd=_centidegrees(message.pitch), result=1,
             roll_cd=_centidegrees(message.roll), series=series.number, unit=message.cam_idx, utc_us=utc_us,
@@ -237,13 +239,13 @@ class ImageObserver:
         before means a restart, or that triggers were faster than the shutter's feedback.
         """
         series = camera.series
-        if index > (series.seen.highest or -1):
+        highest = series.seen.highest
+        if highest is None or index > highest:
             return index
         if completed <= camera.completed:
             self._restart(camera, 1)
             return index
-        late = list(series.seen.gaps(series.first or 0, index))
-        return late[-1][1] if late else None
+        return series.seen.last_missing(series.first or 0, index)
 
     def _count(self, camera: _Camera, index: int, utc_us: int | None) -> None:
         """Follow ArduPilot's count of triggers, which is ahead of the pictures. Without any picture since its start it
@@ -292,7 +294,8 @@ class ImageObserver:
         """Begin a new series, whose index counts from `first`."""
         series = camera.series
         number = series.number + (1 if series.seen or series.failed else 0)
-        camera.deaf = number >= MOST_SERIES
+        camera.restarts += 1  # also those without an image in between, which begin no series
+        camera.deaf = camera.restarts >= MOST_SERIES
         ends = "; its further reports are left out" if camera.deaf else ""
         self.notes.append(f"camera {camera.component} counts its images anew{ends}")
         camera.series = _Series(min(number, MOST_SERIES - 1), first, first - 1, newest_us=series.newest_us)
@@ -330,7 +333,7 @@ class ImageObserver:
             camera = self._camera(AUTOPILOT, now_us)
             if camera is not None:
                 camera.baseline = True
-        for camera in self._cameras.values():
+        for camera in sorted(self._cameras.values(), key=lambda each: each.until_us):  # each in its turn
             if now_us >= camera.due_us:
                 unsettled = camera.series.first is None
                 camera.unanswered += unsettled
@@ -416,6 +419,11 @@ def _place(latitude: int, longitude: int) -> tuple[int | None, int | None]:
     """A place; None for one that does not exist, and for 0 N 0 E, which means unknown."""
     inside = abs(latitude) <= _MOST_E7[0] and abs(longitude) <= _MOST_E7[1]
     return (latitude, longitude) if inside and (latitude, longitude) != (0, 0) else (None, None)
+
+
+def _height(metres: float) -> int | None:
+    """A height in mm; None for one that no vehicle has."""
+    return quantise(float(metres), 1_000, 1) if isfinite(metres) and abs(metres) <= _MOST_METRES else None
 
 
 def _file(url: str | bytes) -> str:

@@ -27,7 +27,14 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
 from rtshcua.mavlink.parameters import nearest_bits, value_of
 from rtshcua.model.flat.contract import EmissionMoment, EmissionSuccess
-from rtshcua.onboard.enforcement.payload_gate import RETRIES, PayloadComponents, ending_of, with_control
+from rtshcua.onboard.enforcement.payload_gate import (
+    RETRIES,
+    PayloadComponents,
+    Sent,
+    ending_of,
+    is_ended,
+    with_control,
+)
 from rtshcua.onboard.ports import Command, CommandFailed, Event, PayloadFrame, PayloadOutcome, Succeeded
 
 #: an unacknowledged command is repeated after this long
@@ -135,9 +142,7 @@ class PayloadSender:
     _path: _Path = field(default_factory=lambda: _Path(()))
     _begun: bool = False
     _sendings: list[_Sending] = field(default_factory=list)
-    _endings: dict[tuple[int, int], PayloadFrame] = field(
-        default_factory=dict
-    )  # what is owed, by command and component
+    _endings: dict[Sent, PayloadFrame] = field(default_factory=dict)  # what is owed
     _ended: Succeeded | None = None  # the success that waits for the commands of the end
     _captured: bool = False  # CAMERA_IMAGE_CAPTURED was heard: CAMERA_FEEDBACK tells of the same pictures
     _images: dict[str, int] = field(default_factory=dict)  # the last index, by message
@@ -300,11 +305,12 @@ class PayloadSender:
             each.last_us = now_us
             self._send(each.frame, each.count, now_us)
 
-    def _send(self, frame: PayloadFrame, count: int, now_us: int, *, ends: bool = False) -> None:
-        component = self.heard.of(frame.addressee)
+    def _send(self, frame: PayloadFrame, count: int, now_us: int, to: int = 0) -> None:
+        """Send a command to the component that it is for, or what ends something to the one that it was begun with."""
+        component = to or self.heard.of(frame.addressee)
         sending = _Sending(
             frame, f"{frame.command} to {component}, {count}", component, self._token, now_us + frame.within_us,
-            now_us + RETRY_US, ends=ends,
+            now_us + RETRY_US, ends=bool(to),
         )  # fmt: skip
         refused = self.send(self._message(sending), now_us)
         if refused is not None:
@@ -313,9 +319,11 @@ class PayloadSender:
         self._tell(now_us, sending, "sent", "")
         self._sendings.append(sending)
         ending = ending_of(frame.command, frame.numbers)
-        self._endings.pop((frame.command, component), None)
-        if ending is not None:
-            self._endings[ending[0], component] = PayloadFrame(
+        if ending is None:
+            by = frame.command, frame.numbers, component
+            self._endings = {owed: each for owed, each in self._endings.items() if not is_ended(owed, by)}
+        else:
+            self._endings[*ending, component] = PayloadFrame(
                 ending[0], frame.addressee, ending[1], None, EmissionMoment.END, 0, 1, 0,
                 EmissionSuccess.ACKNOWLEDGEMENT, 0, frame.within_us, False,
             )  # fmt: skip
@@ -330,8 +338,8 @@ class PayloadSender:
     def _send_endings(self, now_us: int) -> None:
         """End what was begun."""
         endings, self._endings = self._endings, {}
-        for frame in endings.values():
-            self._send(frame, 1, now_us, ends=True)
+        for (_, _, component), frame in endings.items():
+            self._send(frame, 1, now_us, component)
 
     def _repeat(self, now_us: int) -> None:
         """Repeat what nobody acknowledged, and give up what had no effect in time."""

@@ -40,6 +40,9 @@ _DAYS: Final = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
 _TIME: Final = re.compile(
     r"([0-2][0-9]):([0-5][0-9])(?::([0-5][0-9])(?:\.[0-9]{1,9})?)?(?:Z|([+-])([0-2][0-9]):?([0-5][0-9]))"
 )
+_DAY_S: Final = 86_400
+#: the greatest offset from UTC, in minutes
+_FARTHEST: Final = 18 * 60
 _NO_HEIGHT: Final = Decimal(99_999)
 
 
@@ -191,7 +194,8 @@ def _restrict(base: ZoneFeature, zone: dict[str, Any], kinds: Any, member: str) 
         base.rules = ("forbid goto by any when target inside ZONE",)
     conditions = zone.get("restrictionConditions")
     if kind == "CONDITIONAL" or conditions:
-        told = conditions if isinstance(conditions, str) else ", ".join(map(str, conditions or ("not stated",)))
+        each = conditions if isinstance(conditions, list) else [conditions or "not stated"]
+        told = ", ".join(one if isinstance(one, str) else "no text" for one in each)
         base.losses.append(Loss("conditions", base.place, told[:200]))
         base.comments = (kind, f"conditions: {told}")
         base.rules = ("forbid goto by any when target inside ZONE",)
@@ -230,13 +234,17 @@ def _hours(period: dict[str, Any]) -> Hours:
 
 
 def _minutes(written: Any, *, up: bool = False) -> int:
-    """A time of day in UTC, in minutes; rounded up at the end of a window."""
+    """A time of day in minutes of the same day in UTC, which it may precede or follow; rounded up at the end of a
+    window.
+    """
     found = _TIME.fullmatch(written) if isinstance(written, str) else None
     if found is None:
         raise UnkeptFeature("a time of day is not stated with its offset from UTC")
-    hour, minute, second, sign, ahead, rest = found.groups()
-    offset = (int(ahead) * 60 + int(rest)) * (-1 if sign == "-" else 1) if ahead else 0
-    return (int(hour) * 60 + int(minute) + (1 if up and int(second or 0) else 0) - offset) % 1_440
+    hour, minute, second, sign, ahead, rest = found.groups(default="0")
+    minutes, seconds, offset = int(hour) * 60 + int(minute), int(second), int(ahead) * 60 + int(rest)
+    if minutes * 60 + seconds > _DAY_S or offset > _FARTHEST:
+        raise UnkeptFeature("a time of day does not exist")
+    return minutes + (up and seconds > 0) - (-offset if sign == "-" else offset)
 
 
 def _limit(written: Any, unit: Decimal, datum: str) -> Limit | None:

@@ -284,7 +284,7 @@ def _faa_facility_map(properties: dict[str, Any]) -> _Band | None:
     """A cell of a facility map of the FAA: above CEILING, in ft above ground, an authorisation is needed."""
     if "CEILING" not in properties or not {"APT1_ICAO", "APT1_FAAID", "APT1_NAME", "MAP_EFF"} & properties.keys():
         return None
-    floor = Limit(round(_number(properties["CEILING"]) * _FOOT), GROUND)
+    floor = _limit(_number(properties["CEILING"]), "FT", "AGL")
     comments = (f"facility map: an authorisation is needed above {_text(properties, 'CEILING')} ft above ground",)
     read = ("CEILING", "MAP_EFF", "LAST_EDIT", "UNIT", "EFFECTIVE", "Shape__Area", "Shape__Length")
     return _Band(floor, None, comments, read)

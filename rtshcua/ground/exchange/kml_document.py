@@ -16,6 +16,7 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 from zipfile import BadZipFile, LargeZipFile, ZipFile
 
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.ground.exchange.losses import NotReadable
 from rtshcua.ground.language.size_limits import MAX_SIZE
 
@@ -109,6 +110,8 @@ def kml_of(archive: bytes) -> bytes:
             chosen = next((each for each in found if each.filename == "doc.kml"), found[0] if found else None)
             if chosen is None:
                 raise NotReadable("the archive has no KML file")
+            if sum(each.filename == chosen.filename for each in files) > 1:
+                raise NotReadable(f"the archive has several files of the name `{visible(chosen.filename)}`")
             if chosen.flag_bits & _ENCRYPTED or chosen.compress_type not in _METHODS:
                 raise NotReadable("the KML file of the archive is encrypted, or compressed in an unusual way")
             with opened.open(chosen) as file:
@@ -142,17 +145,21 @@ def read_kml(data: bytes) -> KmlDocument:
 
 
 def _features(root: Element) -> Iterator[Element]:
-    """Placemarks, overlays, links, and spans of whole folders, in the order of the document; not what is inside."""
+    """Placemarks, overlays, links, and spans of whole folders, in the order of the document; not what is inside. Also
+    elements of any other kind that have placemarks or links in them.
+    """
     open_ = [root]
     while open_:
         element = open_.pop()
         if _tag(element) in ("kml", "Document", "Folder"):
             open_ += reversed(element)
-        elif _tag(element) in ("Placemark", "NetworkLink", *_OVERLAYS, "TimeSpan"):
+        elif _tag(element) in (*_MARKS, *OVERLAYS, "TimeSpan") or any(_tag(each) in _MARKS for each in element.iter()):
             yield element
 
 
-_OVERLAYS: Final = ("GroundOverlay", "PhotoOverlay", "ScreenOverlay", "Tour")
+_MARKS: Final = ("Placemark", "NetworkLink")
+#: elements that show something and are no zones
+OVERLAYS: Final = ("GroundOverlay", "PhotoOverlay", "ScreenOverlay", "Tour")
 #: elements of a placemark that are its geometry, or are read
 _GEOMETRIES: Final = ("Polygon", "LineString")
 _OTHER_GEOMETRIES: Final = ("Point", "LinearRing", "Model", "Track", "MultiTrack")
@@ -191,21 +198,29 @@ def _polygon(polygon: Element) -> KmlPolygon:
     inner = [each for each in polygon if _tag(each) == "innerBoundaryIs"]
     if len(outer) != 1:
         raise NotReadable(f"a polygon has {len(outer) or 'no'} outer boundaries; expected one")
-    rings = [
-        _positions(text_of(ring, "coordinates"))
-        for each in (*outer, *inner)
-        for ring in each
-        if _tag(ring) == "LinearRing"
-    ]
+    drawn = [[ring for ring in each if _tag(ring) == "LinearRing"] for each in (*outer, *inner)]
+    if len(drawn[0]) != 1 or not all(drawn):
+        raise NotReadable("a boundary of a polygon has no ring, or an outer one has several")
+    rings = [_coordinates(ring) for each in drawn for ring in each]
     return KmlPolygon(tuple(rings), _mode(polygon), text_of(polygon, "extrude").strip() in ("1", "true"))
 
 
 def _line(line: Element) -> KmlLine:
-    return KmlLine(_positions(text_of(line, "coordinates")), _mode(line))
+    return KmlLine(_coordinates(line), _mode(line))
 
 
 def _mode(geometry: Element) -> str:
-    return text_of(geometry, "altitudeMode").strip()
+    """The altitude mode, also of the extension `gx`; all of them if they are not the same."""
+    modes = list(dict.fromkeys((each.text or "").strip() for each in geometry if _tag(each) == "altitudeMode"))
+    return " ".join(modes) if not {*modes} <= {*ON_GROUND} else "".join(modes[:1])
+
+
+def _coordinates(geometry: Element) -> tuple[Position, ...]:
+    """The positions of a ring or a line. Raises `NotReadable` if readers could take them for others."""
+    found = [each for each in geometry if _tag(each) == "coordinates"]
+    if len(found) > 1 or any(len(each) for each in found):
+        raise NotReadable("a ring or a line has several `coordinates`, or elements in them")
+    return _positions(text_of(geometry, "coordinates"))
 
 
 def _positions(text: str) -> tuple[Position, ...]:

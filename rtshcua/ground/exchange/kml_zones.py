@@ -14,6 +14,7 @@ from rtshcua.ground.exchange.geojson_features import line_text, place_of
 from rtshcua.ground.exchange.kml_document import (
     ABSOLUTE,
     ON_GROUND,
+    OVERLAYS,
     RELATIVE,
     KmlDocument,
     KmlLine,
@@ -30,6 +31,7 @@ _UNKEPT = {
     "NetworkLink": ("its content is elsewhere, and no link is followed", "save the document with its content"),
     "TimeSpan": ("it limits a whole folder", "give each placemark its own span"),
 }
+_NOT_READ = ("it is not read, and has placemarks or links in it", "move them into a folder")
 #: elements of a placemark by the loss that they are
 _LOSSES = {
     "description": "description", "Snippet": "description", "snippet": "description", "address": "description",
@@ -48,8 +50,8 @@ class KmlZones(NamedTuple):
 
 def zones_of_kml(document: KmlDocument, width_mm: int | None, use: str) -> KmlZones:
     """The zones of a document. `use`: what they are for."""
-    losses = [Loss("style", place, tag) for tag, place in document.others if tag not in _UNKEPT]
-    links = [NotKept(tag, place, *_UNKEPT[tag]) for tag, place in document.others if tag in _UNKEPT]
+    losses = [Loss("style", place, tag) for tag, place in document.others if tag in OVERLAYS]
+    links = [NotKept(tag, place, *_UNKEPT.get(tag, _NOT_READ)) for tag, place in document.others if tag not in OVERLAYS]
     features = []
     for mark in document.marks:
         losses += _losses(mark)

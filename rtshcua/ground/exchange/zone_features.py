@@ -43,8 +43,8 @@ class Limit(NamedTuple):
 
 
 class Hours(NamedTuple):
-    """Hours of some days, in minutes of the day in UTC; `days` are numbers from monday, 0. Equal times are a whole
-    day.
+    """Hours of some days, in minutes from the beginning of the day in UTC; `days` are numbers from monday, 0. A time
+    with an offset from UTC may be on the day before or after. Equal times are a whole day.
     """
 
     days: tuple[int, ...]
@@ -185,7 +185,7 @@ def _active(period: Period, terms: ZoneTerms) -> Iterator[str]:
     moved = sorted({(day + later) % 7 for day in days})
     on = ", ".join(DAYS[day] for day in moved)
     window = f"{_time(begin + terms.clock)} .. {_time(end + terms.clock)}"
-    if begin == end:
+    if (end - begin) % _MINUTES == 0:
         if (begin + terms.clock) % _MINUTES:
             raise UnkeptFeature("its days begin at another hour than those of the vehicle's clock")
         if len(moved) < len(DAYS):

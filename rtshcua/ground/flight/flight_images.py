@@ -14,7 +14,7 @@ from rtshcua.ground.flight.flown import Flight
 WHOLE_US: Final = 1_000_000
 FRACTION_US: Final = 300_000
 _NUMBERS: Final = re.compile(r"(\d+)")
-_PLAIN: Final = re.compile(r"[^\s#\x00-\x1f\x7f][^\s\x00-\x1f\x7f]*")
+_PLAIN: Final = re.compile(r"(?!#)[^\s\x00-\x1f\x7f\ud800-\udfff]+")
 
 
 class FlightImage(NamedTuple):
@@ -122,7 +122,7 @@ _ADD: Final = "copy all images of the flight into the folder, and no others"
 def _checked(pairs: Sequence[tuple[str, FlightImage]], how: str) -> tuple[tuple[NamedImage, ...], str] | Refusal:
     odd = next((name for name, _ in pairs if not _PLAIN.fullmatch(name)), None)
     if odd is not None:
-        text = f"`{odd}` has a space, or begins with `#`: readers would misread it"
+        text = f"`{odd}` has a space, begins with `#`, or is not UTF-8: readers would misread it"
         return Refusal("odd-name", text, "rename it", ExitCode.INPUT)
     return tuple(NamedImage(name, image) for name, image in pairs), how
 

@@ -219,7 +219,7 @@ class FrameSession:
 
     def _hear_another(self, heard: Frame | None) -> None:
         """Process a frame of another component, if it is one: only the payload of the vehicle matters."""
-        if heard is not None and heard.message == HEARTBEAT and heard.system == self._system:
+        if heard is not None and heard.message == HEARTBEAT and 0 < heard.system == self._system:
             self._payload.hear(heard)
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:

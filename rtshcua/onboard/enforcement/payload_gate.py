@@ -16,7 +16,7 @@ Which commands are payload at all is written down here, independently of the com
 from dataclasses import dataclass, field
 from math import isfinite, isnan
 from struct import pack, unpack
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink import enums
@@ -24,6 +24,7 @@ from rtshcua.mavlink.layouts import COMMAND_LONG, HEARTBEAT, LAYOUTS
 from rtshcua.mavlink.modes import PX4
 from rtshcua.mavlink.parameters import NAN, nearest_bits, value_of
 from rtshcua.model.flat.contract import Addressee, Contract, Emission, EmissionMoment, NumberOrigin
+from rtshcua.model.flat.limits import MAX_EMISSIONS
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 from rtshcua.onboard.enforcement.allow_list import DATUM_MOVES, Frame
@@ -31,6 +32,8 @@ from rtshcua.onboard.ports import PayloadFrame
 
 #: how often an unacknowledged command may be repeated
 RETRIES: Final = 3
+#: how many commands may be left that end what others began: those of a whole step
+MOST_ENDINGS: Final = 1 + MAX_EMISSIONS
 #: the commands to payload (MAV_CMD). Nothing here moves or arms the vehicle, or changes what it may do.
 COMMANDS: Final = frozenset(
     {
@@ -72,6 +75,10 @@ WRONG_TARGET: Final = Refusal("frame/wrong-target", "the frame is for another sy
 TOO_OFTEN: Final = Refusal("frame/too-often", "the command to payload was sent as often as its step declares")
 
 
+#: a command, the bits of its parameters, and the component that it is for
+Sent: TypeAlias = tuple[int, tuple[int, ...], int]
+
+
 class PayloadNumbers(NamedTuple):
     """What a command to payload says: the command, the bits of its parameters, and for whom."""
 
@@ -109,9 +116,7 @@ class _Sendings:
 class _Ending:
     """The command that ends what another one began, and how often it may still be sent."""
 
-    command: int
-    numbers: tuple[int, ...]
-    component: int
+    sent: Sent
     left: int = 1 + RETRIES
 
 
@@ -172,6 +177,12 @@ def ending_of(command: int, numbers: tuple[int, ...]) -> tuple[int, tuple[int, .
     return None
 
 
+def is_ended(ending: Sent, by: Sent) -> bool:
+    """Whether what a command would end is ended by another one: a first parameter of 0 ends all of a kind."""
+    command, numbers, component = by
+    return (ending[0], ending[2]) == (command, component) and numbers[0] in (0, ending[1][0])
+
+
 def control_of(pointing: PayloadFrame, system: int) -> PayloadFrame:
     """The command that takes the primary control of the gimbal which another one points, for us in this system."""
     ours = nearest_bits(system, 1), nearest_bits(enums.MAV_COMP_ID_ONBOARD_COMPUTER, 1)
@@ -218,7 +229,7 @@ class PayloadGate:
     _heard: PayloadComponents = field(default_factory=PayloadComponents)
     _open: list[_Sendings] = field(default_factory=list)
     _servos: tuple[int, ...] = ()
-    _endings: dict[int, _Ending] = field(default_factory=dict)
+    _endings: list[_Ending] = field(default_factory=list)  # the oldest first
 
     def open(self, payload: tuple[PayloadFrame, ...], servos: tuple[int, ...], system: int) -> None:
         """Let the payload's commands of one step pass, in place of those before."""
@@ -250,23 +261,22 @@ class PayloadGate:
                 return None
             else:
                 found = TOO_OFTEN
-        ending = self._endings.get(frame.command)
-        if ending is None or (frame.numbers, frame.component) != (ending.numbers, ending.component):
+        ending = next((each for each in self._endings if each.sent == frame[:3]), None)
+        if ending is None:
             return found
         ending.left -= 1
         if not ending.left:
-            del self._endings[frame.command]
+            self._endings.remove(ending)
         return None
 
     def _begun(self, frame: PayloadNumbers) -> None:
         """A command passed: what it begins may be ended, and what it ends has been."""
         ending = ending_of(frame.command, frame.numbers)
-        if ending is not None:
-            self._endings[ending[0]] = _Ending(*ending, frame.component)
+        if ending is None:
+            self._endings = [each for each in self._endings if not is_ended(each.sent, frame[:3])]
             return
-        ending_by_step = self._endings.get(frame.command)
-        if ending_by_step is not None and ending_by_step.component == frame.component:
-            del self._endings[frame.command]
+        made = _Ending((*ending, frame.component))
+        self._endings = [*(each for each in self._endings if each.sent != made.sent), made][-MOST_ENDINGS:]
 
     def _is(self, frame: PayloadNumbers, declared: PayloadFrame, autopilot: int, home_amsl: int | None) -> bool:
         """Whether a command is the declared one, to the bit, but for the height of home."""

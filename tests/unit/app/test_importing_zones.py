@@ -83,6 +83,19 @@ ED269: list[tuple[str, dict[str, Any], list[str]]] = [
     ("hours", {"applicability": schedule("MON", "TUE")}, [f"{UP} {MONTH} active 10:00 .. 20:00 on monday, tuesday"]),
     ("hours that are the next day here", {"applicability": schedule("SUN", begin="22:30Z", end="23:15:30Z")},
      [f"{UP} {MONTH} active 00:30 .. 01:16 on monday"]),
+    ("a day whose hours begin on the day before in UTC",
+     {"applicability": schedule("MON", begin="01:00+02:00", end="05:00+02:00")},
+     [f"{UP} {MONTH} active 01:00 .. 05:00 on monday"]),
+    ("whole days of the vehicle's clock", {"applicability": schedule("SUN", begin="00:00+02:00", end="24:00+02:00")},
+     [f"{UP} {MONTH} active on sunday"]),
+    ("from the end of a day", {"applicability": schedule("SUN", begin="24:00Z", end="03:00Z")},
+     [f"{UP} {MONTH} active 02:00 .. 05:00 on monday"]),
+    ("an hour that no day has", {"applicability": schedule("SUN", begin="25:00Z", end="29:00Z")},
+     ["refused: a time of day does not exist"]),
+    ("a time after the end of the day", {"applicability": schedule("SUN", end="24:00:30Z")},
+     ["refused: a time of day does not exist"]),
+    ("an offset that no place has", {"applicability": schedule("SUN", begin="08:00+29:00")},
+     ["refused: a time of day does not exist"]),
     ("every day", {"applicability": schedule("ANY", begin="06:00+02:00", end="20:00+02:00")},
      [f"{UP} {MONTH} active 06:00 .. 20:00"]),
     ("two windows", {"applicability": schedule("MON") + schedule("SAT")},
@@ -218,6 +231,10 @@ FEEDS: list[tuple[str, Any, list[str]]] = [
     ("FAA, times as text", faa(TIMESOFUSE="SUNRISE TO SUNSET"), ["refused: its times of use"]),
     ("FAA facility map", geojson({"CEILING": 200, "APT1_ICAO": "KLGA", "MAP_EFF": "2026-06-12"}),
      ["floor 460.96 m above sea"]),
+    ("FAA facility map, no height", geojson({"CEILING": 1e300, "APT1_ICAO": "KLGA"}),
+     ["refused: a limit is out of range"]),
+    ("a height of all features", {**geojson(), "maxAltitude": 100}, ["refused: it has members"]),
+    ("a time of all features", {**geojson(), "metadata": {"validFrom": "2026-01-01"}}, ["refused: it has members"]),
     ("FAA facility map, nothing permitted", geojson({"CEILING": 0, "APT1_ICAO": "KLGA"}), [""]),
 ]  # fmt: skip
 
@@ -265,6 +282,11 @@ KML: list[tuple[str, str, list[str]]] = [
     ("a surface", polygon(",500", "absolute"), ["refused: it is a surface at a height"]),
     ("a slope", polygon(",500", "absolute", extrude=True).replace(",500", ",501", 1), ["refused: its corners"]),
     ("an unknown mode", polygon(",5", "relativeToSeaFloor", extrude=True), ["refused: its altitude mode"]),
+    ("two modes on the ground, as Google Earth writes them", polygon().replace(
+        "<outer", "<altitudeMode>clampToGround</altitudeMode><altitudeMode>clampToSeaFloor</altitudeMode><outer", 1),
+     [""]),
+    ("two modes", polygon(",50", "relativeToGround", extrude=True).replace(
+        "<outer", "<altitudeMode>absolute</altitudeMode><outer", 1), ["refused: its altitude mode is not known, or"]),
     ("a span", f"<TimeSpan><begin>2026-06-01T00:00:00Z</begin></TimeSpan>{polygon()}",
      ['active "2026-06-01T00:00:00Z" .. "2100-01-01T00:00:00Z"']),
     ("a span of days", f"<TimeSpan><begin>2026-06-01</begin></TimeSpan>{polygon()}",
@@ -301,6 +323,8 @@ def test_losses_of_kml_are_named_with_their_place() -> None:
     assert [(each.name, each.place) for each in linked.not_kept] == [("NetworkLink", "NetworkLink[1]")]
     spanned = found_in(kml("<Folder><TimeSpan/>", mark(polygon()), "</Folder>"), "b.kml")
     assert [(each.name, each.place) for each in spanned.not_kept] == [("TimeSpan", "TimeSpan[1]")]
+    hidden = found_in(kml(mark(polygon()), f"<Update><Create>{mark(polygon())}</Create></Update>"), "c.kml")
+    assert [(each.name, each.place) for each in hidden.not_kept] == [("Update", "Update[1]")]
 
 
 def test_a_kmz_is_its_document() -> None:

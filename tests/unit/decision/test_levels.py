@@ -1,6 +1,6 @@
 """The volume of a path whose points have heights of their own: by hand, and against samples taken densely along it."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 from random import Random
 from typing import Any
 
@@ -13,9 +13,9 @@ from reference.asking import POLICY, STEP, ask, loaded, with_contract
 from reference.flat_case import BATTERY, HEIGHT, INSPECT, POSITION_X, POSITION_Y, M
 from reference.naive_geometry import in_shape
 from rtshcua.decision.checks.mission import invocation as problems_of
-from rtshcua.decision.values import FALSE, TRUE, point
-from rtshcua.decision.volume import Planner
-from rtshcua.decision.zones import PreparedZone, WellKnown
+from rtshcua.decision.values import ABSENT, FALSE, MAYBE, PRESENT, TRUE, point
+from rtshcua.decision.volume import Planner, levels
+from rtshcua.decision.zones import PlaceSet, PreparedZone, Sweep, WellKnown
 from rtshcua.model.flat.contract import Facing, MotionKind
 from rtshcua.model.flat.mission import ALONG, Invocation, Plan
 from rtshcua.model.flat.zone import LOWEST, Zone
@@ -126,6 +126,23 @@ def test_the_volume_holds_every_sample_of_the_way(of: Random) -> None:
                 assert low <= z <= high
                 inside = in_shape((x, y), zone) and zone.floor < z < zone.ceiling
                 assert truth & (TRUE if inside else FALSE)
+
+
+@given(worlds.CHANCES)
+def test_a_path_is_compared_once_where_all_of_it_is_on_one_side(of: Random) -> None:
+    """The answer is the union of those of its legs, and the answers of thousands of legs are not kept for each zone."""
+    zone = PreparedZone(0, drawn_zone(of))
+    count, wide = of.randrange(1, 8), of.choice([20, 250])
+    path = tuple(of.randrange(-wide, wide) * M for _ in range(2 * count))
+    heights = tuple(of.choice([4, 6, 10, 15, 25]) * M for _ in range(count))
+    error = of.choice([0, 3 * M])
+    box = (-error, -error, error, error)
+    parts = levels(path, heights, box)
+    for located, gap in product((PRESENT, MAYBE, ABSENT), repeat=2):
+        legs = PlaceSet(parts, located, gap, whole=Sweep(path, box))
+        answer = legs.inside(zone)
+        assert all(not sweep._answers for sweep, _, _ in parts)
+        assert answer == PlaceSet(levels(path, heights, box), located, gap).inside(zone)
 
 
 def test_an_unknown_place_or_height_is_unknown() -> None:

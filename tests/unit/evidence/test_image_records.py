@@ -39,6 +39,7 @@ def test_index_set_is_a_set(values: list[int], first: int, last: int) -> None:
         each for each in range(first, last + 1) if each not in plain
     ]
     assert all(high + 1 < low for (_, high), (low, _) in itertools.pairwise(gaps))
+    assert found.last_missing(first, last) == (gaps[-1][1] if gaps else None)
 
 
 def image(**changed: Any) -> ImageDetail:

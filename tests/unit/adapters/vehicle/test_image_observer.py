@@ -314,6 +314,30 @@ def test_endless_restarts_end_with_a_note() -> None:
     assert w.hear(captured(0, at=999)) == []
 
 
+@pytest.mark.parametrize("repeated", [(status(1_000, 1_000_000), status(0, 0)), (fed_back(1_000, 0), fed_back(1, 0))])
+def test_restarts_without_an_image_in_between_end_with_a_note_too(repeated: tuple[Any, Any]) -> None:
+    w = Watched()
+    for number in range(1_000):
+        w.hear(repeated[number % 2], 1 if repeated[0].get_type() == images.FEEDBACK else 100, after_us=1)
+    assert len(w.observer.notes) == images.MOST_SERIES
+    assert "left out" in w.observer.notes[-1]
+
+
+def test_an_index_of_0_is_taken_once() -> None:
+    w = Watched()
+    w.hear(fed_back(0, 1, completed_captures=1), 1)
+    assert w.hear(fed_back(0, 2, completed_captures=2), 1) == []
+
+
+@pytest.mark.parametrize("field", ["alt_msl", "alt_rel"])
+@pytest.mark.parametrize("metres", [3e38, -3e38, inf, nan])
+def test_a_height_that_no_record_can_have_is_unknown(field: str, metres: float) -> None:
+    (image,) = Watched().hear(fed_back(1, **{field: metres}), 1)
+    assert image.above_home_mm is None
+    assert (image.above_sea_mm is None) == (field == "alt_msl")
+    assert ImageLedger().add(msgspec.json.encode(image).decode()) is None
+
+
 def test_known_images_are_forgotten_in_the_end() -> None:
     w = Watched()
     w.hear(status(0))
@@ -324,10 +348,16 @@ def test_known_images_are_forgotten_in_the_end() -> None:
     assert w.hear(captured(3)) == [], "an old one is no restart"
 
 
-def test_only_so_many_cameras_are_followed() -> None:
+def test_made_up_cameras_keep_no_real_one_out() -> None:
+    """Every camera that can be is followed, and each is asked in its turn, whatever the others lack."""
     w = Watched()
-    taken = [len(w.hear(captured(0), component)) for component in range(100, 106)]
-    assert sum(taken) == images.MOST_CAMERAS
+    for component in range(105, 99, -1):
+        w.hear(status(0), component, after_us=1)
+        assert len(w.hear(captured(1_000, at=1), component, after_us=1)) == 1
+    assert [len(w.hear(fed_back(1), 1))] == [1]
+    assert len(w.observer._cameras) == images.MOST_CAMERAS
+    asked = [to for _ in range(60) for to, number, _ in w.asks(after_us=images.REQUEST_US) if number == 263]
+    assert {asked.count(component) for component in range(100, 106)} == {10}
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -18,7 +18,7 @@ from virtual.flyer import Flyer, climbed
 from virtual.payload_stand_in import AUTOPILOT, CAMERA, GIMBAL, PayloadStandIn
 from virtual.policy import POLICY, geo
 
-START, STOP, PITCHYAW, CONFIGURE, DIST = 2_000, 2_001, 1_000, 1_001, 206
+START, STOP, PITCHYAW, CONFIGURE, DIST, VIDEO = 2_000, 2_001, 1_000, 1_001, 206, 2_500
 ONE, DOWN = nearest_bits(1, 1), nearest_bits(-90, 1)
 PATH = ((0, 30_000), (20_000, 30_000), (20_000, 0))
 
@@ -156,6 +156,23 @@ def test_what_was_begun_is_ended_whoever_flies_then(carrier: Callable[[], Carrie
     assert [numbers[0] for numbers in one.payload.said(CONFIGURE)][1:] == [-3]
     assert len(one.payload.said(STOP)) == 1
     assert ("done", f"{STOP} to {one.camera}, 1: acknowledged") in one.told
+
+
+def test_what_was_begun_is_ended_where_it_was_begun() -> None:
+    """Whoever sends the heartbeats of a camera in a flight cannot keep ours running."""
+    one = Carrier("ardupilot")
+    videos = [case.emission(VIDEO, nearest_bits(stream, 1), to=Addressee.CAMERA) for stream in (1, 2)]
+    one.begin(look_down(), *videos)
+    one.flyer.wait(2)
+    for component, kind in ((CAMERA, 30), (GIMBAL, 26)):
+        one.payload._send(component, m.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3))
+    one.flyer.wait(0.5)
+    one.begin(kind=MotionKind.HOLD)
+    one.flyer.wait(3)
+    assert [numbers[0] for numbers in one.payload.said(VIDEO + 1)] == [1, 2]
+    assert one.payload.said(CONFIGURE)[-1][0] == -3
+    ended = {text.split(",")[0] for what, text in one.told if what == "done"}
+    assert {f"{VIDEO + 1} to {AUTOPILOT}", f"{CONFIGURE} to {AUTOPILOT}"} <= ended
 
 
 def test_a_camera_that_reports_the_same_picture_again_took_one(carrier: Callable[[], Carrier]) -> None:

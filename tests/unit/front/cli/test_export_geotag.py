@@ -133,6 +133,17 @@ def test_exiftool_is_called_without_a_shell_and_without_configuration(fake: Path
     assert lines.count("-execute") == len(files) - 1
 
 
+@pytest.mark.parametrize("without", [0, 1])
+def test_names_that_are_not_utf_8_are_refused(
+    without: int, fake: Path, capsys: pytest.CaptureFixture[str]
+) -> None:  # fmt: skip
+    folder(without=without, name=os.fsdecode(b"\xff{}.JPG"))
+    assert export("--images", "pictures", "--tag", "-o", "geo.txt") == ExitCode.INPUT
+    said = " ".join(capsys.readouterr().err.split())
+    assert "is not UTF-8" in said or "neither names nor times tell" in said
+    assert not Path("geo.txt").exists()
+
+
 def test_a_failure_of_exiftool_is_told(
     fake: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -130,7 +130,7 @@ def test_times_that_fit_in_several_ways_match_nothing() -> None:
     assert slug(named(apart, list(one), one)) == "no-match", "they fit nowhere"
 
 
-@pytest.mark.parametrize("name", ["a b.jpg", "#a.jpg", "a\tb.jpg", "a\nb.jpg"])
+@pytest.mark.parametrize("name", ["a b.jpg", "#a.jpg", "a\tb.jpg", "a\nb.jpg", "a\udcff.jpg"])
 def test_a_file_name_that_readers_would_misread_is_refused(name: str) -> None:
     assert slug(named(nameless(0), [name], {})) == "odd-name"
 

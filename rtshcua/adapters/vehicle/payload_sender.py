@@ -43,6 +43,16 @@ HEEDED: Final = frozenset(
     {"HEARTBEAT", "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK", "GIMBAL_DEVICE_ATTITUDE_STATUS"}
 )
 
+#: the commands after which a camera takes pictures
+PICTURES: Final = frozenset(
+    {
+        enums.MAV_CMD_IMAGE_START_CAPTURE,
+        enums.MAV_CMD_DO_DIGICAM_CONTROL,
+        enums.MAV_CMD_DO_TRIGGER_CONTROL,
+        enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    }
+)
+
 _ACCEPTED, _IN_PROGRESS = 0, 5
 _ATTITUDE: Final = "GIMBAL_DEVICE_ATTITUDE_STATUS"
 _YAW_LOCK, _IN_VEHICLE, _IN_EARTH = 16, 32, 64  # GIMBAL_DEVICE_FLAGS; the first one is also GIMBAL_MANAGER_FLAGS

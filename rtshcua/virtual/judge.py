@@ -89,7 +89,8 @@ def judge(flown: ScenarioFlown) -> Judgement:
     end, ended_us = _end(flown)
     found = [
         *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
-        *_unlogged(flown, motion), *_unlogged_payload(flown), *_faults(flown), *RuntimeChecks(flown, motion).failures(), *_images(flown),
+        *_unlogged(flown, motion), *_unlogged_payload(flown), *_faults(flown),
+        *RuntimeChecks(flown, motion).failures(), *_images(flown),
     ]  # fmt: skip
     judged = [each if each.cause is not None else excuses.judged(each) for each in found]
     margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)

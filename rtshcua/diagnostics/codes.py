@@ -271,6 +271,7 @@ NEVER_TAKES_OFF = _code(
     "a condition before takeoff needs a signal known only in flight",
     Severity.WARNING,
 )
+UNTAKEN_PICTURES = _code("E1314", "untaken-pictures", "a skill states pictures that nobody takes", Severity.WARNING)
 
 # E14: tests and nominals
 NO_NOMINAL = _code("E1401", "no-nominal", "a test has no nominal, or does not say which")
@@ -311,3 +312,4 @@ HASTY_PICTURES = _code("E1704", "hasty-pictures", "pictures are due faster than 
 BLURRED_PICTURES = _code("E1705", "blurred-pictures", "pictures may smear more than a skill permits")
 BAD_PICTURES = _code("E1706", "bad-pictures", "a skill demands pictures that its motion cannot take")
 PATTERN_AREA = _code("E1707", "pattern-area", "an area lacks the line or the structure that a survey pattern needs")
+RARE_PICTURES = _code("E1708", "rare-pictures", "a skill takes pictures more rarely than its `pictures` state")

@@ -585,11 +585,12 @@ UNITS: tuple[FieldUnit, ...] = (
     FieldUnit("_deg", {"deg": 1}, Dimension.ANGLE, 10_000_000),
     FieldUnit("", {"%": 100}, Dimension.RATIO),
 )
+YES_NO: tuple[str, str] = ("yes", "no")
 #: fields with an enumerated value
 WORDS: Mapping[str, tuple[str, ...]] = {
     "mode": tuple(FlightMode),
     "way": tuple(Direction),
-    "held": ("yes", "no"),
+    "held": YES_NO,
     "says": tuple(Voice),
     "counter": tuple(CameraCounter),
 }

@@ -69,7 +69,8 @@ class Incident:
 @dataclass(frozen=True, slots=True)
 class Start:
     """The vehicle, the air and the time at the start; None: the default of the simulated vehicle, and a minute after
-    the issue of the mission. 1/10000, mm/s, degrees, us since the epoch.
+    the issue of the mission; for `camera` and `gimbal`, what the policy's contracts command. 1/10000, mm/s, degrees, us
+    since the epoch.
     """
 
     battery: int | None = None
@@ -77,8 +78,8 @@ class Start:
     wind_from_deg: int = 0
     gust_mm_s: int = 0
     utc_us: int | None = None
-    camera: bool = False
-    gimbal: bool = False
+    camera: bool | None = None
+    gimbal: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,11 +158,13 @@ class Scenario:
     expectations: tuple[ScenarioExpectation, ...]
 
     @property
-    def has_camera(self) -> bool:
-        """Whether its vehicle has a camera: if it starts with one, or one fails."""
-        return self.start.camera or any(isinstance(each.fault, PayloadFault) for each in self.incidents)
+    def has_camera(self) -> bool | None:
+        """Whether its vehicle has a camera: as the start says, or if one fails. None: if its policy commands one."""
+        fails = any(isinstance(each.fault, PayloadFault) for each in self.incidents)
+        return True if fails and self.start.camera is None else self.start.camera
 
     @property
-    def has_gimbal(self) -> bool:
+    def has_gimbal(self) -> bool | None:
         """The same of a gimbal."""
-        return self.start.gimbal or any(isinstance(each.fault, GimbalStuck) for each in self.incidents)
+        fails = any(isinstance(each.fault, GimbalStuck) for each in self.incidents)
+        return True if fails and self.start.gimbal is None else self.start.gimbal

@@ -81,8 +81,9 @@ def parser() -> argparse.ArgumentParser:
     add("--boot", choices=list(Boot), default=Boot.FAST, help="boot time: one second, or as recorded")
     add("--stock", action="store_true", help="GPS, barometer and battery only")
     add("--extra", choices=list(Equipment), action="append", help="equipment instead of the default; repeatable")
-    add("--camera", action="store_true", help="a camera: on PX4 component 100, on ArduCopter the autopilot's own")
-    add("--gimbal", action="store_true", help="a gimbal that carries the camera: on PX4 component 154")
+    fitted = argparse.BooleanOptionalAction
+    add("--camera", action=fitted, default=False, help="a camera: on PX4 component 100, else the autopilot's")
+    add("--gimbal", action=fitted, default=False, help="a gimbal that carries the camera: on PX4 component 154")
     add("--signing-key", type=_key, metavar="FILE", help="the link's signing key: 32 octets, raw or hexadecimal")
     add("--parameter", type=_parameter, action="append", default=[], metavar="NAME=VALUE", help="set a parameter")
     add("--usb", action="store_true", help="the vehicle treats the link as USB")

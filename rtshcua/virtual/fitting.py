@@ -6,6 +6,9 @@ from typing import Any
 
 from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.bounds import narrower, reach_of
+from rtshcua.adapters.vehicle.payload_sender import PICTURES
+from rtshcua.mavlink import enums
+from rtshcua.model.flat.contract import Addressee
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.simulation.ardupilot.parameters import PARAMETERS
@@ -21,6 +24,16 @@ _TOLD_IN = {
     "WIND": Equipment.WIND, "WIND_COV": Equipment.WIND,
 }  # fmt: skip
 
+_POINTS_GIMBAL = frozenset(
+    {
+        enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        enums.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+        enums.MAV_CMD_DO_MOUNT_CONTROL,
+        enums.MAV_CMD_DO_SET_ROI_LOCATION,
+        enums.MAV_CMD_DO_SET_ROI_NONE,
+    }
+)
+
 
 def _extras(policy: Policy) -> frozenset[Equipment]:
     """Return the equipment that a policy's signals need."""
@@ -29,16 +42,19 @@ def _extras(policy: Policy) -> frozenset[Equipment]:
 
 
 def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:
-    """Return a vehicle with the policy's home, endurance, return altitude, least speeds and sensors; `chosen` overrides
-    fields.
+    """Return a vehicle with the policy's home, endurance, return altitude, least speeds, sensors, and the camera and
+    gimbal that its contracts command; `chosen` overrides fields.
     """
     vehicle, projection = policy.vehicle, policy.projection
     kept = _CRUISE_MM_S if vehicle.speeds is None else max(vehicle.speeds.cruise, vehicle.speeds.homeward)
     cruise = min(kept, vehicle.speed or kept, _FASTEST_MM_S)
+    emitted = [each for contract in policy.contracts for each in contract.emits]
     fits: dict[str, Any] = {
         "home": HomePosition(projection.latitude, projection.longitude, HOME.amsl_mm),
         "hover_us": vehicle.endurance_us,
         "extras": _extras(policy),
+        "camera": any(each.addressee == Addressee.CAMERA or each.command in PICTURES for each in emitted),
+        "gimbal": any(each.addressee == Addressee.GIMBAL or each.command in _POINTS_GIMBAL for each in emitted),
         "cruise_mm_s": cruise,
         "max_speed_mm_s": max(cruise, _MOST_MM_S),
     }

@@ -307,8 +307,10 @@ class _Flight:
         start = self._scenario.start
         asked: dict[str, object] = {
             "flavour": AutopilotKind(self._flavour), "seed": self._seed, "answers": Answers.RECORDED,
-            "estimate": Estimate.REAL, "camera": self._scenario.has_camera, "gimbal": self._scenario.has_gimbal,
+            "estimate": Estimate.REAL,
         }  # fmt: skip
+        equipped = {"camera": self._scenario.has_camera, "gimbal": self._scenario.has_gimbal}
+        asked |= {name: fitted for name, fitted in equipped.items() if fitted is not None}
         if start.battery is not None:
             asked["battery"] = start.battery
         if start.wind_mm_s is not None:

@@ -29,7 +29,7 @@ from rtshcua.adapters.vehicle.messages import Announcer, Message, StatusTexts
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator, NoDatum, ObservedVehicle
 from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.adapters.vehicle.payload_sender import HEEDED as OF_PAYLOAD
-from rtshcua.adapters.vehicle.payload_sender import PayloadSender
+from rtshcua.adapters.vehicle.payload_sender import PICTURES, PayloadSender
 from rtshcua.adapters.vehicle.preflight import Preflight
 from rtshcua.adapters.vehicle.px4 import PX4
 from rtshcua.adapters.vehicle.restart import arrives, flown_by, modes_of
@@ -162,6 +162,7 @@ class Driver:
         self._lists_images_us: int | None = None  # when the expected images are told once more
         #: the images that cameras report
         self.images = ImageObserver(slack)
+        self.images.expected = any(sent.command in PICTURES for step in steps for sent in step.contract.emits)
         #: the last observed state of the vehicle
         self.seen = ObservedVehicle()
         self._strangers: set[str] = set()  # notes about other senders under the vehicle's ids
@@ -460,6 +461,8 @@ class Driver:
         self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before, doubted)
         self._payload.system = self.system
         self._payload.begin(command)
+        if any(each.command in PICTURES for each in command.payload):  # a step that replaced one of the mission
+            self.images.expected = True
         self._left_mode = None  # the new manoeuvre keeps it as a suspicion
         self.consumption.fly(command.speed)
         self._unsent = command.token

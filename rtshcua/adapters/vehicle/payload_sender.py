@@ -50,6 +50,16 @@ HEEDED: Final = frozenset(
     {"HEARTBEAT", "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK", "GIMBAL_DEVICE_ATTITUDE_STATUS"}
 )
 
+#: the commands after which a camera takes pictures
+PICTURES: Final = frozenset(
+    {
+        enums.MAV_CMD_IMAGE_START_CAPTURE,
+        enums.MAV_CMD_DO_DIGICAM_CONTROL,
+        enums.MAV_CMD_DO_TRIGGER_CONTROL,
+        enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    }
+)
+
 _ACCEPTED, _IN_PROGRESS = 0, 5
 _ATTITUDE: Final = "GIMBAL_DEVICE_ATTITUDE_STATUS"
 _YAW_LOCK, _IN_VEHICLE, _IN_EARTH = 16, 32, 64  # GIMBAL_DEVICE_FLAGS; the first one is also GIMBAL_MANAGER_FLAGS
@@ -225,11 +235,23 @@ class PayloadSender:
         before, self._images[name] = self._images.get(name), index
         if before == index:
             return
+        if name == "CAMERA_FEEDBACK" and before is not None:
+            self._skip(component, index - before - 1, now_us)
         for each in self._sendings:
             if each.frame.success == EmissionSuccess.IMAGE and each.component == component:
                 what = "failed" if failed else "done"
                 self._end(each, now_us, what, f"image {index}" if not failed else f"image {index} was not captured")
                 return
+
+    def _skip(self, component: int, skipped: int, now_us: int) -> None:
+        """Fail the oldest commands whose pictures the camera's count of triggers has skipped, and not later ones."""
+        waits = [
+            each
+            for each in self._sendings
+            if each.frame.success == EmissionSuccess.IMAGE and each.component == component
+        ]
+        for each in waits[: max(0, min(skipped, len(waits) - 1))]:
+            self._end(each, now_us, "failed", "no image")
 
     def _turned(self, shown: Attitude, component: int, now_us: int) -> None:
         for each in [*self._sendings]:

@@ -438,7 +438,9 @@ def start_simulator(context: FlightContext, loaded: Loaded, port: int) -> Simula
 
 
 def options_of_policy(policy: Policy) -> list[str]:
-    """The simulator's options for the vehicle of a policy: home, endurance, return height, speed and sensors."""
+    """The simulator's options for the vehicle of a policy: home, endurance, return height, speed, sensors, and the
+    camera and gimbal that its contracts command.
+    """
     from rtshcua.virtual.fitting import fitting  # not imported for a real vehicle
 
     fits = fitting(policy)
@@ -449,6 +451,8 @@ def options_of_policy(policy: Policy) -> list[str]:
         f"--hover={fits.hover_us / 60_000_000:.3f}",
         f"--cruise={fits.cruise_mm_s / 1_000:.3f}",
         *(sorted(f"--extra={extra}" for extra in fits.extras) or ["--stock"]),
+        *(["--camera"] if fits.camera else []),
+        *(["--gimbal"] if fits.gimbal else []),
     ]
 
 

@@ -63,9 +63,7 @@ class Incidents:
             options += ["--battery", f"{start.battery / 100:g}"]
         if start.wind_mm_s is not None:
             options += ["--wind", f"{start.wind_mm_s / 1000:g},{start.wind_from_deg},{start.gust_mm_s / 1000:g}"]
-        options += ["--camera"] if self.scenario.has_camera else []
-        options += ["--gimbal"] if self.scenario.has_gimbal else []
-        return options
+        return options + equipment(self.scenario.has_camera, self.scenario.has_gimbal)
 
     def begin(self, policy: PreparedPolicy, mission: Mission, simulator: Simulator) -> Refusal | None:
         """Begin with this mission; a refusal if the scenario flies another one."""
@@ -110,6 +108,12 @@ class Incidents:
             except SimulatorError as error:  # the run notices the lost simulator by itself
                 text += f": {error}"
             self.happened.append(text)
+
+
+def equipment(camera: bool | None, gimbal: bool | None) -> list[str]:
+    """The simulator's options for a camera and a gimbal; None leaves it to the options before."""
+    given = ("camera", camera), ("gimbal", gimbal)
+    return [f"--{name}" if fitted else f"--no-{name}" for name, fitted in given if fitted is not None]
 
 
 def _flown(mission: Mission, policy: Policy) -> tuple[object, ...]:

@@ -50,8 +50,8 @@ from rtshcua.wire.untrusted import Untrusted
 REPLACED = "replacement"
 #: shown in place of the fallback of a step that is refused before take-off
 NOTHING_FLIES = "no command is sent, because the vehicle is on the ground"
-#: effects of the boundary that repeat other records
-_NOT_SHOWN = frozenset({BOUNDARY, PERMITTED, IMAGE})
+#: effects that repeat other records, and those of each picture
+_NOT_SHOWN = frozenset({BOUNDARY, PERMITTED, IMAGE, "payload.sent", "payload.done"})
 _SNAPSHOT_S = 0.1
 _WAITING_NOTE_S = 5.0
 _OUTCOMES = ("allow", "deny", "defer", "fallback")

@@ -14,6 +14,7 @@ from rtshcua.model.faults import (
     KINDS,
     SIGNED,
     WORD_TYPES,
+    YES_NO,
     CameraCounter,
     Direction,
     Fault,
@@ -53,6 +54,13 @@ def fault_of(context: CheckContext, call: FaultCall) -> Fault | None:
             help=f"add {', '.join(f'`{name} = {example(known[name])}`' for name in missing)}",
         )
     return kind(at_us=0, **values) if len(context.report.found) == before else None
+
+
+def is_fitted(context: CheckContext, call: FaultCall) -> bool:
+    """Return whether `camera()` or `camera(fitted = no)` fits the equipment; meaningless after a finding."""
+    known = {"fitted": FaultField("fitted", "fitted", None, YES_NO, is_count=False, is_name=False, needed=False)}
+    given = _given(context, call, known).get("fitted")
+    return given is None or _value(context, call, known["fitted"], given.value) is True
 
 
 def example(parameter: FaultField) -> str:
@@ -121,7 +129,7 @@ def _word(
             fix=None if word is None else correction(context.report, value.span, word, words),
         )
         return None
-    if parameter.name == "held":
+    if parameter.words == YES_NO:
         return word == "yes"
     return WORD_TYPES[parameter.name](word)
 

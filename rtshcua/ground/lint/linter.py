@@ -10,12 +10,13 @@ from rtshcua.ground.lint.idle_policies import idle_airspaces, policies_that_perm
 from rtshcua.ground.lint.lint_input import LintInput
 from rtshcua.ground.lint.readability import misnamed_declarations, repeated_numbers
 from rtshcua.ground.lint.takeoff_landing import degrades_that_keep_up, rules_that_keep_grounded
-from rtshcua.ground.lint.unused import unused_declarations, unused_imports
+from rtshcua.ground.lint.unused import untaken_pictures, unused_declarations, unused_imports
 from rtshcua.ground.prove.proof_context import ProofContext
 
 RULES: tuple[Callable[[LintInput], Iterator[Diagnostic]], ...] = (
     unused_declarations, misnamed_declarations, broad_permits, repeated_numbers, unused_imports,
     policies_that_permit_all, idle_airspaces, unbounded_places, degrades_that_keep_up, rules_that_keep_grounded,
+    untaken_pictures,
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Unused declarations and parameters (E1301), and unused imports (E1305).
+"""Unused declarations and parameters (E1301), unused imports (E1305), and pictures that nobody takes (E1314).
 
 E1301: a template or a mission must read its parameters. A parameter of a skill must be read by the skill or by a rule.
 Other declarations are reported only in a file with a mission or a policy, since any other file may exist to be
@@ -10,6 +10,8 @@ signals that every flight reads, and under `permit any` all skills. A file witho
 the files that import it. There an import is unused only if other imports provide all of its files. All imports of a
 file without declarations are used. Other projects may import a file, so a deletion is safe only if another import
 provides everything that the deleted one does.
+
+E1314: a skill states how often pictures are taken, and commands no camera to take them.
 """
 
 from collections.abc import Iterable, Iterator
@@ -25,12 +27,28 @@ from rtshcua.ground.checker.symbols import WORDS, Declaration
 from rtshcua.ground.checker.well_known import MEASURED, WELL_KNOWN
 from rtshcua.ground.lint.lint_input import LintInput
 from rtshcua.ground.pipeline.closure import Imports
+from rtshcua.ground.prove.commanded_pictures import takes_pictures
 from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import ENTRY
 from rtshcua.model.ir.program import Import, Unit
 from rtshcua.model.ir.skills import ParameterDecl, SkillDecl
 from rtshcua.model.ir.tests import Named
+
+
+def untaken_pictures(subject: LintInput) -> Iterator[Diagnostic]:
+    """Report pictures with a spacing that no command of their skill takes (E1314)."""
+    for skill in (each for unit in subject.requested for each in unit.skills):
+        pictures = skill.pictures
+        spaced = pictures is not None and (pictures.every or any(each.part == "every" for each in skill.sized))
+        if pictures is not None and spaced and not takes_pictures(skill):
+            yield Diagnostic(
+                codes.UNTAKEN_PICTURES,
+                f"`{skill.name.text}` states pictures, but commands no camera to take them",
+                pictures.span,
+                help="add `emits MAV_CMD_IMAGE_START_CAPTURE to camera with param3 = 1 every ...`; if the camera "
+                "triggers itself, ignore this with that reason",
+            )
 
 
 def mentions(*nodes: Node | None) -> frozenset[str]:

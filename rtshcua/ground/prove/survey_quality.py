@@ -1,4 +1,4 @@
-"""Prove what the pictures of a survey show: pixel, overlap, interval and blur (E1701 to E1705).
+"""Prove what the pictures of a survey show: pixel, overlap, interval and blur (E1701 to E1705, E1708).
 
 A contract is proved for the worst case of its parameters' ranges, so every step within them keeps what its skill
 demands. What depends on the area is proved for each step with its own arguments: the distance of the lines on a path,
@@ -22,6 +22,7 @@ from rtshcua.ground.geometry.polygons import path_length
 from rtshcua.ground.geometry.survey import AROUND, DEFAULT_PATTERN, SIDEWAYS, around_reach, line_spacing, structure_of
 from rtshcua.ground.lower.mission import argument_span
 from rtshcua.ground.lower.survey_plan import SurveyPlan, camera_named, relief_of, survey_camera, survey_plan
+from rtshcua.ground.prove.commanded_pictures import prove_commanded
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission
@@ -164,6 +165,7 @@ def prove_survey_quality(proof: ProofContext) -> None:
         if camera is None:
             _no_camera(proof, skill.pictures)
             continue
+        prove_commanded(proof, skill, skill.pictures, camera)
         for flown, fault in _of_contract(proof, skill, camera):
             _report(proof, skill, camera, flown, fault)
 

@@ -9,7 +9,7 @@ from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source, Span
 from rtshcua.ground.checker.checks.scenarios import FITTED, OBSTACLE
 from rtshcua.ground.checker.context import CheckContext
-from rtshcua.ground.checker.faults import fault_of
+from rtshcua.ground.checker.faults import fault_of, is_fitted
 from rtshcua.ground.checker.symbols import correction, suggestion
 from rtshcua.ground.lower.conditions import ConditionPlace
 from rtshcua.ground.lower.fixed_tables import FixedTables, MissingFromPolicy, knows_zone
@@ -158,7 +158,7 @@ class _Lowering:
                 start = replace(start, battery=each.value.value)
                 continue
             if each.name.text in FITTED:
-                start = replace(start, **{each.name.text: True})
+                start = replace(start, **{each.name.text: is_fitted(self._context, each)})
                 continue
             wind = fault_of(self._context, each)
             assert isinstance(wind, WindStep)

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace as with_fields
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from reference import imaged_flight
+from reference import imaged_flight, payload_case
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
@@ -533,6 +533,35 @@ def test_unlogged_frame_is_a_failure(good: ScenarioFlown) -> None:
     assert "unlogged-effect" in slugs(judge(replace(good, frames=(ended,))))
     full = (IncidentOccurrence(0, 0, faults.DiskFull(0), ""),)
     assert causes(judge(replace(good, frames=(early,), happened=full))) == [("unlogged-effect", "disk")]
+
+
+def test_command_to_payload_belongs_to_a_skill_that_declares_it(good: ScenarioFlown) -> None:
+    def found(*frames: SentFrame, emits: int = 0, of: int = 0) -> list[str]:
+        """Why commands are failures, if a contract declares a command; the first one is that of the takeoff."""
+        contracts = list(good.policy.contracts)
+        declared = (payload_case.emission(emits),) if emits else ()
+        contracts[of] = with_fields(contracts[of], emits=declared)
+        policy = with_fields(good.policy, contracts=tuple(contracts))
+        failures = judge(replace(good, frames=(*good.frames, *frames), policy=policy)).failures
+        assert {each.slug for each in failures} <= {"unlogged-effect"}
+        return [each.text for each in failures]
+
+    def sent(at_us: int, number: int, *parameters: float) -> SentFrame:
+        return SentFrame(at_us, at_us, long(number, *parameters))
+
+    first, last = motion(good)[0].sent_us, motion(good)[-1].sent_us
+    names = [each.name for each in good.policy.contracts]
+    takeoff = names.index("takeoff")
+    other = (takeoff + 1) % len(names)
+    assert found(sent(first + S, 2000), emits=2000, of=takeoff) == []
+    assert "the last command was `takeoff`" in found(sent(first + S, 2000), emits=2000, of=other)[0]
+    assert "the last command was `takeoff`" in found(sent(first + S, 530), emits=2000, of=takeoff)[0]
+    assert found(sent(last + S, 2000), emits=2000, of=takeoff)
+    assert found(sent(last + S, 2001), emits=2000, of=takeoff) == [], "it ends a series of pictures"
+    assert found(sent(last + S, 1001, -3), sent(first + S, 1001, 1), emits=1000, of=takeoff) == []
+    assert found(sent(last + S, 1001, 1), emits=1000, of=takeoff), "it takes control again"
+    assert "while no process ran" in found(sent(good.ended_us + S, 2001), emits=2000, of=takeoff)[0]
+    assert found(sent(first + S, 2000)), "nobody declares it"
 
 
 def test_frame_may_belong_to_either_of_two_simultaneous_commands() -> None:

@@ -10,10 +10,11 @@ from rtshcua.ground.checker.checks.expectations import check_expectation
 from rtshcua.ground.checker.condition_nodes import walk
 from rtshcua.ground.checker.conditions import check_condition, is_about_phase
 from rtshcua.ground.checker.context import CheckContext
-from rtshcua.ground.checker.faults import NAMED, fault_of
+from rtshcua.ground.checker.faults import NAMED, fault_of, is_fitted
 from rtshcua.ground.checker.fields import one_of, quantity
 from rtshcua.ground.checker.lookup import find_flown, find_skill, find_zone
 from rtshcua.ground.checker.symbols import correction, suggestion
+from rtshcua.model.faults import GimbalStuck, PayloadFault
 from rtshcua.model.ir.expression import Condition, Edge, ForLast, Near, Quantity, WithinLast
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.scenarios import (
@@ -71,9 +72,12 @@ def _check(context: CheckContext, scenario: ScenarioDecl) -> None:
     _flavours(context, scenario)
     if scenario.seeds is not None:
         _seeds(context, scenario.seeds)
+    before = len(context.report.found)
     for beginning in scenario.start:
         _beginning(context, beginning)
     _once(context, scenario)
+    if len(context.report.found) == before:
+        _lacking(context, scenario)
     for incident in scenario.incidents:
         moment = incident.moment
         _delay(context, moment.delay)
@@ -145,8 +149,8 @@ def _beginning(context: CheckContext, beginning: Beginning) -> None:
         quantity(context, beginning.value, Dimension.RATIO, positive=False, most=10_000)
     elif isinstance(beginning, FaultCall) and name.text == WIND:
         fault_of(context, beginning)
-    elif isinstance(beginning, FaultCall) and name.text in FITTED and not beginning.arguments:
-        pass
+    elif isinstance(beginning, FaultCall) and name.text in FITTED:
+        is_fitted(context, beginning)
     elif isinstance(beginning, FaultCall) and name.text in NAMED and name.text != BATTERY:
         context.report.add(
             codes.BAD_START,
@@ -165,6 +169,24 @@ def _beginning(context: CheckContext, beginning: Beginning) -> None:
             or "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, `start camera(), gimbal()`",
             fix=correction(context.report, name.span, name.text, known) if misspelt else None,
         )
+
+
+def _lacking(context: CheckContext, scenario: ScenarioDecl) -> None:
+    """Report faults of equipment that the start leaves out."""
+    given = [each for each in scenario.start if isinstance(each, FaultCall) and each.arguments]
+    fitted = {each.name.text: each for each in given if each.name.text in FITTED and not is_fitted(context, each)}
+    for incident in scenario.incidents:
+        kind = NAMED.get(incident.fault.name.text)
+        lacks = "gimbal" if kind is GimbalStuck else "camera"
+        if kind is not None and issubclass(kind, PayloadFault) and lacks in fitted:
+            context.report.add(
+                codes.BAD_START,
+                fitted[lacks].span,
+                f"the vehicle starts without the {lacks} that fails later",
+                help=f"write `{lacks}()`, or leave the fault out",
+                fix=(fitted[lacks].span, f"{lacks}()", f"write `{lacks}()`"),
+                labels=[(incident.fault.span, "fails here")],
+            )
 
 
 def _once(context: CheckContext, scenario: ScenarioDecl) -> None:

@@ -8,12 +8,20 @@ from typing import Any
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from reference import flat_case as flat
+from reference import payload_case
 from rtshcua.adapters.vehicle import image_observer as images
+from rtshcua.adapters.vehicle.driver import Driver
 from rtshcua.adapters.vehicle.image_observer import ImageObserver
+from rtshcua.codec.frames import Codec
 from rtshcua.evidence.image_records import ImageDetail, ImageLedger, read_image
-from rtshcua.onboard.ports import ImageReported, ImagesExpected
+from rtshcua.mavlink import enums
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.onboard.enforcement.frames import FrameSession
+from rtshcua.onboard.ports import Command, ImageReported, ImagesExpected, PayloadFrame
 
 S, UTC = 1_000_000, 1_700_000_000_000_000
 HOME = 488_000
@@ -388,3 +396,20 @@ def test_whatever_is_reported_the_records_agree_with_each_other(seed: int) -> No
             told = ledger.missing(camera, series, first, last)
             assert told.first <= told.last + 1
     assert ledger.taken > 20
+
+
+def test_images_are_expected_if_a_step_or_what_replaced_one_takes_pictures() -> None:
+    step = flat.MISSION.invocations[0]
+    for command, taken in (
+        (enums.MAV_CMD_IMAGE_START_CAPTURE, True),
+        (enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, True),
+        (enums.MAV_CMD_SET_CAMERA_ZOOM, False),
+    ):
+        looks = replace(step, contract=replace(step.contract, emits=(payload_case.emission(command),)))
+        assert Driver(flat.POLICY, FrameSession(), steps=(step, looks)).images.expected is taken
+        driver = Driver(flat.POLICY, FrameSession(), steps=(step,))
+        assert driver.images.expected is False
+        driver.receive(Codec(1, 1).pack(m.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)), S)
+        sent = PayloadFrame(command, 1, (0,) * 7, None, 0, 0, 1, 0, 0, 0, S, False)
+        driver.begin(Command(7, "look", MotionKind.HOLD, (), (), 0, 0, payload=(sent,)), S)
+        assert driver.images.expected is taken

@@ -122,7 +122,8 @@ def test_an_acknowledgement_is_no_picture(carrier: Callable[[], Carrier]) -> Non
     outcomes = [what for what, _ in one.told]
     assert outcomes.count("sent") == 4
     assert outcomes.count("failed") == 1
-    assert one.told[-1][1].endswith("no image")
+    (failed,) = [text for what, text in one.told if what == "failed"]
+    assert failed.endswith("4: no image" if one.apart else "2: no image"), "ArduPilot's index counts what was lost"
 
 
 @pytest.mark.parametrize(("result", "why"), [(None, "no answer"), (2, "denied")])
@@ -173,6 +174,18 @@ def test_what_was_begun_is_ended_where_it_was_begun() -> None:
     assert one.payload.said(CONFIGURE)[-1][0] == -3
     ended = {text.split(",")[0] for what, text in one.told if what == "done"}
     assert {f"{VIDEO + 1} to {AUTOPILOT}", f"{CONFIGURE} to {AUTOPILOT}"} <= ended
+
+
+def test_a_count_of_triggers_tells_which_command_took_no_picture(carrier: Callable[[], Carrier]) -> None:
+    one = carrier()
+    one.payload.captures = lambda number: False
+    one.begin(picture(EmissionMoment.TIME, 300_000), kind=MotionKind.HOLD, hold_us=900_000)
+    for index in (7, 9):
+        one.flyer.wait(0.6)
+        one.payload._send(one.camera, m.MAVLink_camera_feedback_message(0, 0, 0, index, *[0] * 9))
+    one.flyer.wait(0.2)
+    ended = [(what, text.partition(", ")[2]) for what, text in one.told if what != "sent"]
+    assert ended[:3] == [("done", "1: image 7"), ("failed", "2: no image"), ("done", "3: image 9")]
 
 
 def test_a_camera_that_reports_the_same_picture_again_took_one(carrier: Callable[[], Carrier]) -> None:

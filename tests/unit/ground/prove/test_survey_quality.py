@@ -105,6 +105,67 @@ def test_demand_that_is_not_kept_is_refused_with_the_nearest_value(
         assert code not in [each.code.id for each in findings(mended)], fix.replacement
 
 
+def emits(*commands: str) -> tuple[str, str]:
+    """The change by which the survey emits commands."""
+    given = "".join(f"\n  emits MAV_CMD_{each}" for each in commands)
+    return "energy   at most 35 %", f"energy at most 35 %{given}"
+
+
+SHOT, AUTO, SERIES = (
+    "IMAGE_START_CAPTURE to camera with param3 = 1",
+    "DO_SET_CAM_TRIGG_DIST to camera with param1 =",
+    "IMAGE_START_CAPTURE to camera with param3 = 0, param2 =",
+)
+BY_TIME = ("every 8 m resolution 2 cm overlap 80 % forward", "every 1 s resolution 2 cm overlap 80 % forward")
+
+
+@rows(
+    ("changes", "code", "at", "message", "help"),
+    [
+        ([emits(f"{SHOT} every 8 m")], "", "", "", ""),
+        ([emits(f"{SHOT} every 8.1 m")], "E1708", "8.1 m",
+         "pictures are taken every 8.1 m, which is more rarely than every 8 m", "nearest accepted: `8 m`"),
+        ([emits(f"{SHOT} every 8.1 m", f"{SHOT} every 8 m")], "", "", "", ""),
+        ([emits(f"{SHOT} every 1 s")], "", "", "", ""),
+        ([emits(f"{SHOT} every 1.1 s")], "E1708", "1.1 s",
+         "pictures are taken every 1.1 s, which at 8 m/s is more rarely than every 8 m", "nearest accepted: `1 s`"),
+        ([BY_TIME, emits(f"{SHOT} every 8 m")], "", "", "", ""),
+        ([BY_TIME, emits(f"{SHOT} every 9 m")], "E1708", "9 m",
+         "pictures are taken every 9 m, which at 8 m/s is more rarely than every 1 s", "nearest accepted: `8 m`"),
+        ([emits(f"{SHOT} every 5 m")], "E1704", "5 m",
+         "at 8 m/s pictures are taken every 625 ms, but the camera needs 700 ms", "nearest accepted: `5.6 m`"),
+        ([emits(f"{SHOT} every 0.5 s")], "E1704", "0.5 s",
+         "at 8 m/s pictures are taken every 500 ms, but the camera needs 700 ms", "nearest accepted: `700 ms`"),
+        ([emits(f"{AUTO} 8 m at begin")], "", "", "", ""),
+        ([emits(f"{AUTO} 12 m at begin")], "E1708", "12 m",
+         "pictures are taken every 12 m, which is more rarely than every 8 m", "nearest accepted: `8 m`"),
+        ([emits(f"{AUTO} away at begin")], "E1708", "away",
+         "pictures are taken every 15 m, which is more rarely than every 8 m", "nearest accepted: `8 m`"),
+        ([emits(f"{SERIES} 2 s at begin")], "E1708", "2 s",
+         "pictures are taken every 2 s, which at 8 m/s is more rarely than every 8 m", "nearest accepted: `1 s`"),
+        ([emits(f"{SERIES} 1 s at begin")], "", "", "", ""),
+        ([emits(f"{SHOT} at each waypoint")], "E1708", "emits MAV_CMD_",
+         "pictures are taken at single moments, and not every 8 m", "write `every 8 m` for the moment"),
+        ([emits("DO_TRIGGER_CONTROL to camera with param1 = 1 at begin")], "", "", "", ""),
+        ([emits("SET_CAMERA_ZOOM to camera with param1 = 1, param2 = 1 at begin")], "", "", "", ""),
+    ],
+)  # fmt: skip
+def test_commands_take_the_pictures_that_are_stated(
+    changes: list[tuple[str, str]], code: str, at: str, message: str, help: str
+) -> None:
+    text = program(*changes)
+    found = findings(text)
+    assert [each.code.id for each in found] == [code] * bool(code), [each.message for each in found]
+    for each in found:
+        assert each.span is not None
+        assert text[each.span.start : each.span.end].startswith(at)
+        assert each.message == message
+        assert (each.help or "").startswith(help)
+        for fix in each.fixes:
+            mended = text[: fix.span.start] + fix.replacement + text[fix.span.end :]
+            assert findings(mended) == ()
+
+
 def test_program_of_these_tests_is_accepted() -> None:
     assert findings(PROGRAM) == ()
 

@@ -71,11 +71,13 @@ def test_start_is_lowered() -> None:
 
 def test_start_or_a_fault_fits_a_camera_and_a_gimbal() -> None:
     for body, fitted in (
-        ("", (False, False)),
-        ("start camera()", (True, False)),
+        ("", (None, None)),
+        ("start camera()", (True, None)),
+        ("start camera(fitted = yes), gimbal(fitted = no)", (True, False)),
         ("start gimbal(), camera(), battery = 80 %", (True, True)),
-        ("at 3 s camera_loss(part = 10 %)", (True, False)),
-        ("at 3 s camera_reboot(counter = continues)", (True, False)),
+        ("at 3 s camera_loss(part = 10 %)", (True, None)),
+        ("at 3 s camera_reboot(counter = continues)", (True, None)),
+        ("start camera(fitted = no) at 3 s gimbal_stuck(for = 5 s)", (False, True)),
         ("at 3 s gimbal_stuck(for = 5 s)", (True, True)),
     ):
         scenario = flown(body).scenario
@@ -277,9 +279,27 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
     ("start camra()", "E1608", "`camra()` is not allowed in `start`", "did you mean `camera`?"),
     (
         "start gimbal(for = 3 s)",
+        "E0601",
+        "`gimbal` has no argument `for`",
+        "its arguments are `fitted`",
+    ),
+    (
+        "start camera(fitted = maybe)",
+        "E0313",
+        "`maybe` is not a value of `fitted` of `camera`",
+        "its values are `yes`, `no`",
+    ),
+    (
+        "start camera(fitted = no) at 3 s camera_full()",
         "E1608",
-        "`gimbal(for = 3 s)` is not allowed in `start`",
-        "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, `start camera(), gimbal()`",
+        "the vehicle starts without the camera that fails later",
+        "write `camera()`, or leave the fault out",
+    ),
+    (
+        "start gimbal(fitted = no) at 3 s gimbal_stuck()",
+        "E1608",
+        "the vehicle starts without the gimbal that fails later",
+        None,
     ),
     ("start camera(), camera()", "E1406", "`camera` is given twice", "keep one of them"),
     ("start battery = 8 %, battery = 9 %", "E1406", "`battery` is given twice", "keep one of them"),

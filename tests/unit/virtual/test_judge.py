@@ -12,6 +12,7 @@ from msgspec.structs import replace as with_fields
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from reference import imaged_flight
+from reference.payload_case import emission
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
@@ -379,6 +380,8 @@ def reposition(x: int, y: int) -> bytes:
         (long(176, 1, 9), "ardupilot", {MotionKind.LAND}),
         (long(22), "px4", {MotionKind.CLIMB}),
         (long(185, 1), "px4", set()),
+        (long(2000, 0, 0, 1), "px4", None),
+        (long(211, 1), "ardupilot", None),
         (reposition(473_977_400, 85_455_900), "px4", {MotionKind.FLY, MotionKind.COVER}),
         (reposition(0x7FFFFFFF, 0x7FFFFFFF), "px4", {MotionKind.HOLD}),
         (b"\xfd\x00garbage is nothing", "px4", None),
@@ -533,6 +536,37 @@ def test_unlogged_frame_is_a_failure(good: ScenarioFlown) -> None:
     assert "unlogged-effect" in slugs(judge(replace(good, frames=(ended,))))
     full = (IncidentOccurrence(0, 0, faults.DiskFull(0), ""),)
     assert causes(judge(replace(good, frames=(early,), happened=full))) == [("unlogged-effect", "disk")]
+
+
+def test_command_to_payload_belongs_to_a_running_step_that_emits_it(good: ScenarioFlown) -> None:
+    goto = next(each for each in motion(good) if moves(each.octets, "px4") == {MotionKind.FLY, MotionKind.COVER})
+    last_us = motion(good)[-1].sent_us
+    take, stop, point, control, release = 2000, 2001, 1000, 1001, 211
+
+    def told(sent_us: int, number: int, *parameters: float, emits: tuple[int, ...] = (take, point)) -> list[str]:
+        made = tuple(emission(each) for each in emits)
+        policy = with_fields(
+            good.policy,
+            contracts=tuple(
+                with_fields(each, emits=made if each.motion.kind in {MotionKind.FLY, MotionKind.COVER} else ())
+                for each in good.policy.contracts
+            ),
+        )
+        frame = SentFrame(sent_us, sent_us, long(number, *parameters))
+        found = judge(replace(good, policy=policy, frames=(*good.frames, frame)))
+        return [each.text for each in found.failures if each.slug == "unlogged-effect"]
+
+    soon_us = goto.sent_us + S // 10
+    outside, ended = "was sent outside of a step that emits it", good.ended_us + S
+    assert told(soon_us, take) == told(soon_us, point) == told(soon_us, control, 1, 191) == []
+    assert told(soon_us, take, emits=()) == [f"MAV_CMD_IMAGE_START_CAPTURE {outside}"]
+    assert told(soon_us, control, 1, 191, emits=(take,)) == [f"MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE {outside}"]
+    assert told(soon_us, release) == [f"MAV_CMD_DO_GRIPPER {outside}"]
+    assert told(last_us, take) == [f"MAV_CMD_IMAGE_START_CAPTURE {outside}"]
+    assert told(last_us, stop) == told(last_us, control, -3, -3) == []
+    assert told(last_us, stop, emits=(point,)) == [f"MAV_CMD_IMAGE_STOP_CAPTURE {outside}"]
+    assert told(last_us, control, 1, 191) == [f"MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE {outside}"]
+    assert told(ended, take) == ["MAV_CMD_IMAGE_START_CAPTURE was sent while no process ran"]
 
 
 def test_frame_may_belong_to_either_of_two_simultaneous_commands() -> None:

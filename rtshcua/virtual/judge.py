@@ -14,7 +14,7 @@ then compares the logs with the frames.
 | `late` | a motion frame was sent later than a permit, a step's deadline or the reaction bound allows |
 | `log` | a log does not verify |
 | `derive` | a decision of a log cannot be derived again |
-| `unlogged-effect` | a motion frame, or a command to payload, belongs to no command in the log |
+| `unlogged-effect` | a motion frame or a command to payload belongs to no command in the log |
 | `fault` | the runtime raised an exception, or the run did not end |
 
 `runtime_checks` defines further slugs, from supervision to fallback chains.
@@ -89,8 +89,8 @@ def judge(flown: ScenarioFlown) -> Judgement:
     end, ended_us = _end(flown)
     found = [
         *fence, *_collision(flown), *takeovers, *end, *reactions, *_permits(flown, motion), *_logs(flown),
-        *_unlogged(flown, motion), *_unlogged_payload(flown), *_faults(flown),
-        *RuntimeChecks(flown, motion).failures(), *_images(flown),
+        *_unlogged(flown, motion), *_payload(flown), *_faults(flown), *RuntimeChecks(flown, motion).failures(),
+        *_images(flown),
     ]  # fmt: skip
     judged = [each if each.cause is not None else excuses.judged(each) for each in found]
     margins = Margins(fence_mm, _nearest(flown.samples), stop_us, takeover_us, ended_us)
@@ -227,14 +227,27 @@ _SHOWS_US: Final = 200_000
 #: PX4's reported stopping distance (`Navigator::calculate_breaking_stop`): MPC_ACC_HOR, and its addition for the jerk
 _TOLD_BRAKING_MM_S2: Final = 3_000
 _TOLD_DELAY_S: Final = 0.6
-_REQUEST_MESSAGE, _HEARTBEAT, _COMMAND_LONG = 512, 0, 76
-#: commands to cameras, gimbals, grippers, winches and free servo outputs; and what a declared one implies: the end of
-#: a series of pictures or of a video, the control of a gimbal
-_PAYLOAD: Final = frozenset(
-    {183, 195, 197, 203, 205, 206, 211, 530, 531, 532, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 42600}
-)
-_IMPLIED: Final[Mapping[int, int]] = {2000: 2001, 2500: 2501, 1000: 1001}
+_REQUEST_MESSAGE, _HEARTBEAT = 512, 0
 _ASKS: Final = frozenset({401, 511, _REQUEST_MESSAGE})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL
+_POINT, _CONTROL = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+#: commands to payload, which cause no motion (`_payload`): those that a skill may emit, and what ends them
+_PAYLOAD: Final = frozenset({
+    dialect.MAV_CMD_IMAGE_START_CAPTURE, dialect.MAV_CMD_IMAGE_STOP_CAPTURE, dialect.MAV_CMD_VIDEO_START_CAPTURE,
+    dialect.MAV_CMD_VIDEO_STOP_CAPTURE, dialect.MAV_CMD_SET_CAMERA_MODE, dialect.MAV_CMD_SET_CAMERA_ZOOM,
+    dialect.MAV_CMD_SET_CAMERA_FOCUS, dialect.MAV_CMD_DO_DIGICAM_CONTROL, dialect.MAV_CMD_DO_TRIGGER_CONTROL,
+    dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST, _POINT, _CONTROL, dialect.MAV_CMD_DO_MOUNT_CONTROL,
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION, dialect.MAV_CMD_DO_SET_ROI_NONE, dialect.MAV_CMD_DO_GRIPPER,
+    dialect.MAV_CMD_DO_WINCH, dialect.MAV_CMD_DO_SET_SERVO,
+})  # fmt: skip
+#: what may also be sent after its step: by the command that ends something, the one that begins it
+_ENDS: Final[Mapping[int, int]] = {
+    dialect.MAV_CMD_IMAGE_STOP_CAPTURE: dialect.MAV_CMD_IMAGE_START_CAPTURE,
+    dialect.MAV_CMD_VIDEO_STOP_CAPTURE: dialect.MAV_CMD_VIDEO_START_CAPTURE,
+    dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST: dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    _CONTROL: _POINT,
+}
+#: the first parameter of `_CONTROL` that gives the control back
+_GIVES_BACK: Final = -3
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
 _SET_MODE: Final = 176
 #: the modes of `_MODES` without a reported target
@@ -290,6 +303,8 @@ def _moves(message: Any, name: str, flavour: str) -> frozenset[MotionKind] | Non
             return _LEGS
         case 192 if name == "COMMAND_INT":  # DO_REPOSITION
             return frozenset({MotionKind.HOLD}) if (message.x, message.y) == (_NOWHERE, _NOWHERE) else _LEGS
+    if name == "COMMAND_LONG" and message.command in _PAYLOAD:
+        return None
     return None if message.command in _ASKS else frozenset()
 
 
@@ -299,34 +314,8 @@ Motion = Sequence[Obeyed]
 
 
 def _motion(flown: ScenarioFlown) -> Motion:
-    declared = frozenset[int]().union(*_declared(flown).values())
-    sent = (frame for frame in flown.frames if (payload_command(frame.octets) or (0, False))[0] not in declared)
-    read = ((frame, moves(frame.octets, flown.flavour)) for frame in sent)
+    read = ((frame, moves(frame.octets, flown.flavour)) for frame in flown.frames)
     return sorted(((frame, kinds) for frame, kinds in read if kinds is not None), key=lambda each: each[0].sent_us)
-
-
-def payload_command(octets: bytes) -> tuple[int, bool] | None:
-    """Return the command to payload of a frame, and whether it only ends what was begun; None for any other frame."""
-    if len(octets) < 10 or octets[0] != 0xFD or int.from_bytes(octets[7:10], "little") != _COMMAND_LONG:
-        return None
-    try:
-        message = dialect.MAVLink(None).decode(bytearray(octets))
-    except dialect.MAVError:
-        return None
-    if message.command not in _PAYLOAD:
-        return None
-    ends = message.command in (2001, 2501) or (message.command, message.param1) in ((206, 0), (1001, -3))
-    return message.command, ends
-
-
-def _declared(flown: ScenarioFlown) -> dict[str, frozenset[int]]:
-    """Return the commands to payload that each skill may send: those of its contract, and what these imply."""
-    return {
-        contract.name: frozenset(
-            number for each in contract.emits for number in (each.command, _IMPLIED.get(each.command, each.command))
-        )
-        for contract in flown.policy.contracts
-    }
 
 
 # ---------------------------------------------------------------- takeovers
@@ -604,23 +593,44 @@ def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[JudgedFailure]:
             yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")
 
 
-def _unlogged_payload(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
-    """Yield commands to payload that the skill that flies does not declare. What ends another one may come later."""
-    declared = _declared(flown)
-    sent = [(frame, found) for frame in flown.frames if (found := payload_command(frame.octets)) is not None]
-    for life in flown.lives if sent else ():
-        commands = list(_commands(records_of(life), flown.start_us))
-        for frame, (number, ends) in sent:
-            begun = [each for each in commands if each.at_us <= frame.sent_us]
-            if not life.began_us <= frame.sent_us <= life.ended_us or (ends and begun):
-                continue
-            may_be = [each.skill for each in begun if each.at_us == frame.sent_us or each is begun[-1]]
-            if not any(number in declared.get(skill, ()) for skill in may_be):
-                why = f", but the last command was `{begun[-1].skill}`" if begun else ", but no command was dispatched"
-                yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent{why}")
+def _payload(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
+    """Yield commands to payload that were sent outside of a step whose skill emits them, except those that end what
+    such a step began.
+    """
+    emitted = {each.name: frozenset(one.command for one in each.emits) for each in flown.policy.contracts}
+    for name, commands in emitted.items():
+        emitted[name] = commands | ({_CONTROL} if _POINT in commands else set())
+    sent = [(frame, message) for frame in flown.frames if (message := _payload_command(frame.octets)) is not None]
+    for life in flown.lives:
+        commands_sent = list(_commands(records_of(life), flown.start_us))
+        for frame, message in sent:
+            if life.began_us <= frame.sent_us <= life.ended_us:
+                begun = [each for each in commands_sent if each.at_us <= frame.sent_us]
+                if not _emitted(message, frame.sent_us, begun, emitted):
+                    text = f"{_name(frame)} was sent outside of a step that emits it"
+                    yield JudgedFailure("unlogged-effect", frame.sent_us, text)
     for frame, _ in sent:
         if not any(life.began_us <= frame.sent_us <= life.ended_us for life in flown.lives):
             yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")
+
+
+def _payload_command(octets: bytes) -> Any:
+    """Return the message of a command to payload; None if it is none."""
+    if octets[:1] != b"\xfd" or int.from_bytes(octets[7:10], "little") != dialect.MAVLINK_MSG_ID_COMMAND_LONG:
+        return None
+    message = dialect.MAVLink(None).decode(bytearray(octets))
+    return message if message.command in _PAYLOAD else None
+
+
+def _emitted(message: Any, sent_us: int, begun: Sequence[_Sent], emitted: Mapping[str, frozenset[int]]) -> bool:
+    """Whether a command to payload belongs to the running step, or ends what a step before began."""
+    number = message.command
+    ends = number in _ENDS and (number != _CONTROL or message.param1 == _GIVES_BACK)
+    if ends and any(_ENDS[number] in emitted.get(each.skill, ()) for each in begun):
+        return True
+    if not begun or number not in emitted.get(begun[-1].skill, ()):
+        return False
+    return begun[-1].over_us is None or begun[-1].over_us >= sent_us
 
 
 def _commands(records: Sequence[dict[str, Any]], start_us: int) -> Iterator[_Sent]:

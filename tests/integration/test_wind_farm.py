@@ -6,34 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.app.programs import read_sources
-from rtshcua.app.testing.run import ISSUED_AT_US
-from rtshcua.campaign.rounds import FlownMission
-from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.front.cli import app
 from rtshcua.front.cli.table import COMMANDS
-from rtshcua.ground.pipeline.suite import scenarios
-from rtshcua.ground.testing.scenario_lowering import ScenarioFlight
-from rtshcua.mavlink import dialect
-from rtshcua.virtual import development_keys
-from rtshcua.virtual.expectations import expectations
-from rtshcua.virtual.flight import LATER_US
-from rtshcua.virtual.judge import judge
+from virtual.examples import failures_of, flights_of
 
 FARM = Path(__file__).resolve().parents[2] / "examples" / "wind_farm"
-FLIGHTS = re.findall(r'(?m)^scenario "(.*)"', (FARM / "tests" / "flights.rts").read_text(encoding="utf-8"))
+FLIGHTS = FARM / "tests" / "flights.rts"
 
 
 @pytest.fixture
 def farm(monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(FARM)
     return FARM
-
-
-def flight(name: str) -> ScenarioFlight:
-    found = scenarios(read_sources([Path("tests/flights.rts")]).program, dialect.load(), ISSUED_AT_US, LATER_US)
-    assert not has_errors(found.diagnostics)
-    return next(each for each in found.found if each.scenario.name == name)
 
 
 @pytest.mark.slow
@@ -59,18 +43,9 @@ def test_every_tower_is_an_exclusion_zone(farm: Path) -> None:
 
 
 @pytest.mark.soak  # each takes as long as ten tests
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize(("name", "flavour"), flights_of(FLIGHTS))
 def test_scenarios_fly_as_expected(farm: Path, name: str, flavour: str) -> None:
-    chosen = flight(name)
-    assert flavour in chosen.scenario.flavours
-    policy, start = chosen.policy.lowered.policy, chosen.scenario.start
-    assert start.utc_us is not None
-    mission = development_keys.flies_at(chosen.mission, start.utc_us)
-    was = FlownMission.of(policy, mission, mission.issued_at_us).flown(chosen.scenario, flavour, 1)
-    verdict = judge(was)
-    assert verdict.failures == ()
-    assert [each.found for each in expectations(was, verdict) if not each.met] == []
+    assert failures_of(FLIGHTS, name, flavour) == []
 
 
 def test_page_names_existing_commands_and_sources() -> None:

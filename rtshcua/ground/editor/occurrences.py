@@ -347,7 +347,8 @@ class _OccurrenceFinder:
         scope = sizes | self._parameters(skill.parameters, owner)
         yield from self._declared(skill.parameters, owner, sizes)
         yield from self._declared(skill.sizes, owner)
-        yield from self.within(tuple(each.size for each in skill.sized), sizes)
+        named = [each.every for each in skill.emits if isinstance(each.every, Reference)]
+        yield from self.within((*(each.size for each in skill.sized), *named), sizes)
         if skill.motion is not None:
             motion = skill.motion
             for name in (

@@ -37,7 +37,7 @@ from rtshcua.model.flat.contract import (
 )
 from rtshcua.model.flat.policy import LeftOut, VehicleLimits
 from rtshcua.model.flat.zone import MAX_COORDINATE
-from rtshcua.model.ir.expression import Coordinates
+from rtshcua.model.ir.expression import Coordinates, Quantity
 from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
 from rtshcua.model.ir.skills import EmitsDecl, LinkDecl, MotionDecl, SkillDecl
@@ -138,7 +138,7 @@ class ContractLowering:
                 for sent in sent_numbers(self._context, skill, emits)
             ),
             moment=int(moment),
-            amount=0 if emits.every is None else emits.every.value,
+            amount=emits.every.value if isinstance(emits.every, Quantity) else 0,
             success=int(success),
             bound=limit_of(emits, Dimension.ANGLE, 0),
             within_us=limit_of(emits, Dimension.DURATION, WAITS_US),

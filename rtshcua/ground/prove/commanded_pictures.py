@@ -77,7 +77,7 @@ def _spacing(proof: ProofContext, skill: SkillDecl, emits: EmitsDecl) -> Iterato
     """Yield the greatest spacing of the pictures of a command; nothing if it takes them at points alone."""
     if emits.command.text == BY_DISTANCE:
         yield from _number(proof, skill, emits, "param1", Dimension.LENGTH)
-    elif emits.every is not None:
+    elif isinstance(emits.every, Quantity):
         yield Spacing(emits.every.value, emits.every.dimension, emits.every.span)
     elif emits.command.text == SERIES and _constant(emits, "param3") == 0:
         yield from _number(proof, skill, emits, "param2", Dimension.DURATION)

@@ -26,6 +26,7 @@ from rtshcua.ground.prove.commanded_pictures import prove_commanded
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission
+from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.ir.places import CameraDecl
 from rtshcua.model.ir.skills import MotionDecl, ParameterDecl, PicturesDecl, SkillDecl
@@ -156,10 +157,14 @@ def _forward(camera: SurveyCamera, near: int, speed: int, pictures: PicturesDecl
 
 
 def prove_survey_quality(proof: ProofContext) -> None:
-    """Report every skill of a policy whose pictures may show less than it demands."""
-    for contract in proof.policy.contracts:
+    """Report every skill of a policy whose pictures may show less than it demands.
+
+    A skill that the policy only forbids never flies, and a vehicle without the camera may import the rule.
+    """
+    permits = [rule for rule in proof.policy.rules if rule.kind == RuleKind.PERMIT]
+    for number, contract in enumerate(proof.policy.contracts):
         skill = proof.skills[contract.name]
-        if skill.pictures is None:
+        if skill.pictures is None or not any(not rule.skills or number in rule.skills for rule in permits):
             continue
         camera = camera_named(proof.lowered.vehicle, skill.pictures)
         if camera is None:

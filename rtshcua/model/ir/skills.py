@@ -125,7 +125,7 @@ class EmitsDecl(Node):
     parameters: tuple[EmittedParameter, ...]
     once: Name | None  # `at begin`, `at end`
     each: Name | None  # `at each turn`, `at each waypoint`
-    every: Quantity | None  # one of these three
+    every: Quantity | Reference | None  # one of these three; a name: of a size
     success: SuccessDecl | None
     required: bool  # its failure is that of the step
 

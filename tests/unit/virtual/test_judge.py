@@ -11,7 +11,8 @@ import pytest
 from msgspec.structs import replace as with_fields
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from reference import imaged_flight, payload_case
+from reference import imaged_flight
+from reference.payload_case import emission
 from rtshcua.model import faults
 from rtshcua.model.faults import Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
@@ -379,6 +380,8 @@ def reposition(x: int, y: int) -> bytes:
         (long(176, 1, 9), "ardupilot", {MotionKind.LAND}),
         (long(22), "px4", {MotionKind.CLIMB}),
         (long(185, 1), "px4", set()),
+        (long(2000, 0, 0, 1), "px4", None),
+        (long(211, 1), "ardupilot", None),
         (reposition(473_977_400, 85_455_900), "px4", {MotionKind.FLY, MotionKind.COVER}),
         (reposition(0x7FFFFFFF, 0x7FFFFFFF), "px4", {MotionKind.HOLD}),
         (b"\xfd\x00garbage is nothing", "px4", None),
@@ -535,33 +538,35 @@ def test_unlogged_frame_is_a_failure(good: ScenarioFlown) -> None:
     assert causes(judge(replace(good, frames=(early,), happened=full))) == [("unlogged-effect", "disk")]
 
 
-def test_command_to_payload_belongs_to_a_skill_that_declares_it(good: ScenarioFlown) -> None:
-    def found(*frames: SentFrame, emits: int = 0, of: int = 0) -> list[str]:
-        """Why commands are failures, if a contract declares a command; the first one is that of the takeoff."""
-        contracts = list(good.policy.contracts)
-        declared = (payload_case.emission(emits),) if emits else ()
-        contracts[of] = with_fields(contracts[of], emits=declared)
-        policy = with_fields(good.policy, contracts=tuple(contracts))
-        failures = judge(replace(good, frames=(*good.frames, *frames), policy=policy)).failures
-        assert {each.slug for each in failures} <= {"unlogged-effect"}
-        return [each.text for each in failures]
+def test_command_to_payload_belongs_to_a_running_step_that_emits_it(good: ScenarioFlown) -> None:
+    goto = next(each for each in motion(good) if moves(each.octets, "px4") == {MotionKind.FLY, MotionKind.COVER})
+    last_us = motion(good)[-1].sent_us
+    take, stop, point, control, release = 2000, 2001, 1000, 1001, 211
 
-    def sent(at_us: int, number: int, *parameters: float) -> SentFrame:
-        return SentFrame(at_us, at_us, long(number, *parameters))
+    def told(sent_us: int, number: int, *parameters: float, emits: tuple[int, ...] = (take, point)) -> list[str]:
+        made = tuple(emission(each) for each in emits)
+        policy = with_fields(
+            good.policy,
+            contracts=tuple(
+                with_fields(each, emits=made if each.motion.kind in {MotionKind.FLY, MotionKind.COVER} else ())
+                for each in good.policy.contracts
+            ),
+        )
+        frame = SentFrame(sent_us, sent_us, long(number, *parameters))
+        found = judge(replace(good, policy=policy, frames=(*good.frames, frame)))
+        return [each.text for each in found.failures if each.slug == "unlogged-effect"]
 
-    first, last = motion(good)[0].sent_us, motion(good)[-1].sent_us
-    names = [each.name for each in good.policy.contracts]
-    takeoff = names.index("takeoff")
-    other = (takeoff + 1) % len(names)
-    assert found(sent(first + S, 2000), emits=2000, of=takeoff) == []
-    assert "the last command was `takeoff`" in found(sent(first + S, 2000), emits=2000, of=other)[0]
-    assert "the last command was `takeoff`" in found(sent(first + S, 530), emits=2000, of=takeoff)[0]
-    assert found(sent(last + S, 2000), emits=2000, of=takeoff)
-    assert found(sent(last + S, 2001), emits=2000, of=takeoff) == [], "it ends a series of pictures"
-    assert found(sent(last + S, 1001, -3), sent(first + S, 1001, 1), emits=1000, of=takeoff) == []
-    assert found(sent(last + S, 1001, 1), emits=1000, of=takeoff), "it takes control again"
-    assert "while no process ran" in found(sent(good.ended_us + S, 2001), emits=2000, of=takeoff)[0]
-    assert found(sent(first + S, 2000)), "nobody declares it"
+    soon_us = goto.sent_us + S // 10
+    outside, ended = "was sent outside of a step that emits it", good.ended_us + S
+    assert told(soon_us, take) == told(soon_us, point) == told(soon_us, control, 1, 191) == []
+    assert told(soon_us, take, emits=()) == [f"MAV_CMD_IMAGE_START_CAPTURE {outside}"]
+    assert told(soon_us, control, 1, 191, emits=(take,)) == [f"MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE {outside}"]
+    assert told(soon_us, release) == [f"MAV_CMD_DO_GRIPPER {outside}"]
+    assert told(last_us, take) == [f"MAV_CMD_IMAGE_START_CAPTURE {outside}"]
+    assert told(last_us, stop) == told(last_us, control, -3, -3) == []
+    assert told(last_us, stop, emits=(point,)) == [f"MAV_CMD_IMAGE_STOP_CAPTURE {outside}"]
+    assert told(last_us, control, 1, 191) == [f"MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE {outside}"]
+    assert told(ended, take) == ["MAV_CMD_IMAGE_START_CAPTURE was sent while no process ran"]
 
 
 def test_frame_may_belong_to_either_of_two_simultaneous_commands() -> None:

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.suggest import listed
 from rtshcua.ground.checker.checks.accepts import UNSET, scale_of
+from rtshcua.ground.checker.checks.parameters import unknown_size
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.fields import one_of
 from rtshcua.ground.checker.name_scope import Argument
@@ -19,7 +20,7 @@ from rtshcua.mavlink.dialect import Field
 from rtshcua.mavlink.parameters import NAN, nearest_bits, value_of
 from rtshcua.model.flat.contract import Addressee, EmissionMoment, EmissionSuccess, NumberOrigin
 from rtshcua.model.flat.limits import MAX_EMISSIONS, MAX_PAYLOAD_WAIT, MAX_SERVOS, MAX_VALUE, MIN_EMISSION_INTERVAL
-from rtshcua.model.ir.expression import Quantity
+from rtshcua.model.ir.expression import Quantity, Reference
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.places import VehicleDecl
 from rtshcua.model.ir.skills import EmitsDecl, EmittedParameter, SkillDecl
@@ -133,7 +134,7 @@ def check_payload(context: CheckContext, vehicle: VehicleDecl, skill: SkillDecl)
     free = [servo.value for servo in vehicle.servos]
     for emits in skill.emits:
         every, moment = emits.every, moment_of(emits)
-        if every is not None and moment is EmissionMoment.DISTANCE:
+        if isinstance(every, Quantity) and moment is EmissionMoment.DISTANCE:
             shortest = -(-MIN_EMISSION_INTERVAL * vehicle.speed.value // 1_000_000)
             if every.value < shortest:
                 help = f"at its greatest speed it flies {display(shortest, Dimension.LENGTH)} in the shortest interval"
@@ -186,9 +187,11 @@ def _may_be_emitted(context: CheckContext, emits: EmitsDecl) -> bool:
 
 def moment_of(emits: EmitsDecl) -> EmissionMoment | None:
     """When a command is sent; None if that is unknown."""
-    if emits.every is not None:
+    if isinstance(emits.every, Quantity):
         of_time = emits.every.dimension is Dimension.DURATION
         return EmissionMoment.TIME if of_time else EmissionMoment.DISTANCE
+    if emits.every is not None:  # a name that is no size
+        return None
     named, known = _named_moment(emits)
     return known.get(named.text)
 
@@ -204,6 +207,9 @@ def _named_moment(emits: EmitsDecl) -> tuple[Name, Mapping[str, EmissionMoment]]
 def _time(context: CheckContext, skill: SkillDecl, emits: EmitsDecl) -> None:
     """Report a moment that does not exist, or not in this skill, and intervals that are none."""
     report, every, moment = context.report, emits.every, moment_of(emits)
+    if isinstance(every, Reference):
+        unknown_size(context, skill, every)
+        return
     if every is not None:
         if every.dimension not in (Dimension.DURATION, Dimension.LENGTH):
             help = "write a distance or a time, as in `every 10 m` or `every 2 s`"

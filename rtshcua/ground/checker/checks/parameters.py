@@ -180,17 +180,21 @@ def _argument(context: CheckContext, size: ParameterDecl) -> Argument | None:
 
 def _named(context: CheckContext, skill: SkillDecl) -> None:
     """Report each part of a contract that names an unknown size."""
-    known = [size.name.text for size in skill.sizes]
     for each in skill.sized:
-        name, span = each.size.name, each.size.span
-        if name not in known:  # findings on a known size are reported at its declaration
-            context.report.add(
-                codes.UNKNOWN_NAME,
-                span,
-                f"`{name}` is not a size of `{skill.name.text}`",
-                help=suggestion(name, known) or "write a number with its unit, or declare it: `sizes (... = ...)`",
-                fix=correction(context.report, span, name, known),
-            )
+        unknown_size(context, skill, each.size)
+
+
+def unknown_size(context: CheckContext, skill: SkillDecl, size: Reference) -> None:
+    """Report a name that is not a size of the skill; findings on a known size are reported at its declaration."""
+    known = [each.name.text for each in skill.sizes]
+    if size.name not in known:
+        context.report.add(
+            codes.UNKNOWN_NAME,
+            size.span,
+            f"`{size.name}` is not a size of `{skill.name.text}`",
+            help=suggestion(size.name, known) or "write a number with its unit, or declare it: `sizes (... = ...)`",
+            fix=correction(context.report, size.span, size.name, known),
+        )
 
 
 def _given(context: CheckContext, declaration: SizesDecl) -> None:

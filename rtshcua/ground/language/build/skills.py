@@ -173,7 +173,7 @@ class EmissionTime(NamedTuple):
 
     once: Name | None = None
     each: Name | None = None
-    every: Quantity | None = None
+    every: Quantity | Reference | None = None
 
 
 def emitted_parameter(reader: Reader, span: Span, field: Name, value: Quantity | Reference) -> EmittedParameter:
@@ -199,8 +199,8 @@ def each_time(reader: Reader, span: Span, name: Name) -> EmissionTime:
     return EmissionTime(each=name)
 
 
-def repeatedly(reader: Reader, span: Span, every: Quantity) -> EmissionTime:
-    """`every 10 m`."""
+def repeatedly(reader: Reader, span: Span, every: Quantity | Reference) -> EmissionTime:
+    """`every 10 m`, `every spacing`."""
     return EmissionTime(every=every)
 
 

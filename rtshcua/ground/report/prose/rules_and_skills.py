@@ -268,7 +268,7 @@ def _emitted(emits: EmitsDecl) -> str:
         for parameter in emits.parameters
     ]
     to = "the autopilot" if emits.addressee.text == "vehicle" else f"the {emits.addressee.text}"
-    if emits.every is not None:
+    if isinstance(emits.every, Quantity):
         when = f"every {display(emits.every.value, emits.every.dimension)}"
     elif emits.each is not None:
         when = f"at each {emits.each.text}"

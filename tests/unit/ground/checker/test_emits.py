@@ -33,6 +33,17 @@ def said(*emits: str) -> list[tuple[str, str]]:
     return found(f"{IMPORTS}{SKILL}{lines}}}\n{policy()}")
 
 
+def test_interval_is_a_size_that_a_project_sets() -> None:
+    def said_of(every: str, given: str = "") -> list[tuple[str, str]]:
+        declared = SKILL.replace(") {", ") sizes (spacing: length in 1 m .. 50 m = 8 m) {", 1)
+        return found(f"{IMPORTS}{declared}  emits {START} every {every}\n}}\n{given}\n{policy()}")
+
+    assert said_of("spacing") == []
+    assert said_of("spacing", "sizes probe(spacing = 1 m)") == [("E0431", "payload is commanded too often")]
+    assert said_of("spacnig") == [("E0201", "`spacnig` is not a size of `probe`")]
+    assert said_of("pause") == [("E0201", "`pause` is not a size of `probe`")]
+
+
 @rows(
     "emits",
     [

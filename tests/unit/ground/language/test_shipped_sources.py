@@ -47,6 +47,7 @@ def test_shipped_sources_are_parsed_together(checkout: Path) -> None:
     }
     assert {skill.name.text for unit in found.units for skill in unit.skills} == {
         "takeoff", "hover", "goto", "inspect_area", "return_home", "emergency_land",
+        "photograph_area", "photograph_structure", "release_load",
     }  # fmt: skip
     assert {signal.name.text for unit in found.units for signal in unit.signals} >= {"position", "height", "battery"}
     assert set(found.stable.values()) == {"lib:" + str(Path(path).relative_to(checkout)) for path in paths}

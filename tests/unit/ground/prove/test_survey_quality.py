@@ -26,6 +26,15 @@ def step(*changes: tuple[str, str]) -> StepPictures:
     return one
 
 
+def test_skill_that_is_only_forbidden_needs_no_camera() -> None:
+    other = ("by mapper", "by camera2")
+    forbidden = ("permit takeoff, look by", "forbid look by any when altitude > 50 m\n  permit takeoff by")
+    without = ("    look(field, 50 m)\n", "")
+    assert checked(program(other, forbidden, without)).diagnostics == ()
+    assert [each.code.id for each in checked(program(other, without)).diagnostics] == ["E1701"]
+    assert "E0702" in [each.code.id for each in checked(program(other, forbidden)).diagnostics]
+
+
 @rows(
     ("changes", "code", "at", "message", "help"),
     [

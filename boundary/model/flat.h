@@ -77,7 +77,7 @@ typedef struct {
 /* Commands to payload. The addressee of RT_AUTOPILOT is `VEHICLE` in Python. */
 enum { RT_AUTOPILOT = 0, RT_CAMERA = 1, RT_GIMBAL = 2 };
 enum { RT_AT_BEGIN = 0, RT_AT_END = 1, RT_AT_TURN = 2, RT_AT_WAYPOINT = 3, RT_BY_DISTANCE = 4, RT_BY_TIME = 5 };
-enum { RT_BY_ACKNOWLEDGEMENT = 0, RT_BY_IMAGE = 1, RT_BY_ATTITUDE = 2 };
+enum { RT_BY_ACKNOWLEDGEMENT = 0, RT_BY_IMAGE = 1, RT_BY_ATTITUDE = 2, RT_BY_ALL_IMAGES = 3 };
 enum { RT_CONSTANT = 0, RT_OF_ARGUMENT = 1, RT_LATITUDE = 2, RT_LONGITUDE = 3, RT_HEIGHT = 4 };
 
 typedef struct {

@@ -186,6 +186,7 @@ class ImageLedger:
     def __init__(self) -> None:
         self._series: dict[tuple[int, int], _RecordedSeries] = {}
         self._latest: dict[int, int] = {}
+        self._told: dict[tuple[int, int], MissingDetail] = {}
         #: the number of recorded images, and of pictures that failed
         self.taken = self.failed = 0
 
@@ -196,6 +197,7 @@ class ImageLedger:
         if isinstance(record, Recover):
             self._series.clear()
             self._latest.clear()
+            self._told.clear()
             return None
         if record.event == IMAGE:
             return self.add(record.detail)
@@ -239,4 +241,19 @@ class ImageLedger:
         expected = encoded(missing_of(told.camera, told.series, seen, told.first, told.last, series.failed))
         if beyond or expected != text:
             return Flaw("image/missing", "the list of missing images contradicts the recorded images", text, expected)
+        self._told[told.camera, told.series] = told
         return None
+
+    def incomplete(self) -> Flaw | None:
+        """Return the flaw in the success of a step that requires all images, unless the last lists are up to date, and
+        list no image that is missing or has failed.
+        """
+        told = self._told
+        listed = bool(told) and all(
+            key in told and (told[key].taken, told[key].failed) == (len(series.seen), series.failed)
+            for key, series in self._series.items()
+        )
+        if listed and not any(each.missing or each.failed for each in told.values()):
+            return None
+        text = "; ".join(encoded(each) for each in told.values()) or "no list of images"
+        return Flaw("image/incomplete", "a step that requires all images succeeded without them", text)

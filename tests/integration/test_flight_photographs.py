@@ -15,6 +15,7 @@ import pytest
 from reference.photographed import JOBS, LOSES
 from reference.sources import LIBRARY
 from reference.verifiers import agree
+from rtshcua.adapters.vehicle.image_observer import ImageObserver
 from rtshcua.app.testing.run import ISSUED_AT_US
 from rtshcua.campaign.rounds import FlownMission
 from rtshcua.diagnostics.diagnostic import has_errors
@@ -35,9 +36,8 @@ AXIS, FLAT = 6_378_137_000, 0.00669438  # mm, and the square of the eccentricity
 Place = tuple[float, float, float]  # mm east and north of home, and above it
 
 
-def fly(name: str, flavour: str) -> tuple[ScenarioFlown, StepPictures]:
-    """Fly a job once, and return it with the numbers that were proved."""
-    text = JOBS[name].source + LOSES
+def fly(text: str, flavour: str) -> tuple[ScenarioFlown, StepPictures]:
+    """Fly the scenario of a source once, and return it with the numbers that were proved."""
 
     def read(path: str) -> bytes:
         return text.encode() if path == "job.rts" else Path(path).read_bytes()
@@ -164,17 +164,66 @@ def resolved(job: str, flown: ScenarioFlown, proved: int) -> None:
 @pytest.mark.parametrize(
     ("job", "flavour"),
     [
-        ("turbine", "px4"),
+        ("bridge", "px4"),
         ("bridge", "ardupilot"),
         *(
             pytest.param(*each, marks=pytest.mark.soak)
-            for each in (("turbine", "ardupilot"), ("bridge", "px4"), ("grid", "px4"), ("grid", "ardupilot"))
+            for each in (("turbine", "px4"), ("turbine", "ardupilot"), ("grid", "px4"), ("grid", "ardupilot"))
         ),
     ],
 )
 def test_a_job_is_photographed_without_an_unexplained_gap(job: str, flavour: str) -> None:
-    flown, pictures = fly(job, flavour)
+    flown, pictures = fly(JOBS[job].source + LOSES, flavour)
     assert flown.lives[0].ending == "completed"
     verified(flown)
     explained(flown, JOBS[job].spacing, JOBS[job].least)
     resolved(job, flown, pictures.pixel_um)
+
+
+REQUIRED = ("succeeds with image within 3 s", "succeeds with all_images within 10 s required")
+
+
+LOST = "at 0 s camera_loss(part = 10 %)"
+REPORTS_LOST = "at 40 s link_loss(loss = 20 %, for = 20 s)"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("flavour", "faults", "ending"),
+    [
+        ("px4", REPORTS_LOST, "completed"),
+        ("ardupilot", LOST, "aborted"),
+        pytest.param("px4", LOST, "aborted", marks=pytest.mark.soak),
+        pytest.param("ardupilot", "", "completed", marks=pytest.mark.soak),
+    ],
+)
+def test_a_step_that_requires_all_images_waits_for_lost_reports_and_fails_without_pictures(
+    flavour: str, faults: str, ending: str
+) -> None:
+    source = JOBS["bridge"].source.replace(*REQUIRED)
+    assert source != JOBS["bridge"].source
+    flown, _ = fly(source + LOSES.replace(LOST, faults), flavour)
+    assert flown.lives[0].ending == ending
+    verified(flown)
+    _, text = effects(flown, "images-missing")[0]
+    first = msgspec.json.decode(text, type=MissingDetail)
+    assert (first.missing + first.failed > 0) == (ending == "aborted")
+    failed = [detail for event, detail in effects(flown, "failed") if detail.startswith("images-missing")]
+    assert bool(failed) == (ending == "aborted"), effects(flown, "failed")
+    assert any(each.asked for each in images(flown)) == (faults == REPORTS_LOST)
+
+
+@pytest.mark.slow
+def test_a_success_without_images_that_its_contract_requires_is_found_in_the_log(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(ImageObserver, "lacking", lambda observer, since_us: "")
+    flown, _ = fly(JOBS["bridge"].source.replace(*REQUIRED) + LOSES, "ardupilot")
+    (life,) = flown.lives
+    assert life.ending == "completed"
+    auditor = Auditor(flown.root)
+    for line in life.lines:
+        auditor.take(line)
+    failure = auditor.audit().report.failure
+    assert failure is not None
+    assert failure.slug == "image/incomplete"

@@ -68,6 +68,10 @@ static bool check_moment(const rt_emission *emission, int64_t motion, const rt_v
     }
 }
 
+static bool takes_pictures(int64_t command) {
+    return command == DIGICAM || command == IMAGE_START || command == 206 || command == 2003;
+}
+
 static bool check_success(const rt_emission *emission) {
     const int64_t command = emission->command, bound = emission->bound;
     if (!rt_within(emission->within_us, 1, RT_MAX_PAYLOAD_WAIT) || !rt_within(emission->required, 0, 1)) return false;
@@ -75,6 +79,7 @@ static bool check_success(const rt_emission *emission) {
     case RT_BY_ACKNOWLEDGEMENT: return bound == 0;
     case RT_BY_IMAGE: return bound == 0 && (command == DIGICAM || command == IMAGE_START);
     case RT_BY_ATTITUDE: return rt_within(bound, 1, HALF_TURN) && (command == MOUNT_CONTROL || command == PITCHYAW);
+    case RT_BY_ALL_IMAGES: return bound == 0 && takes_pictures(command);
     default: return false;
     }
 }

@@ -173,7 +173,7 @@ class Driver:
         self._who_us: int | None = None
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
-        self._payload = PayloadSender(self._send_payload)
+        self._payload = PayloadSender(self._send_payload, lacking=self.images.lacking)
         self._sent: list[bytes] = []  # what the payload was sent, to return with other frames
         self._left_mode: int | None = None  # one report shows a mode change away from this mode that is not ours
         self._others: str | None = None  # how a takeover showed; nothing of ours begins after it
@@ -335,7 +335,13 @@ class Driver:
         sender.datum = (self.seen.home_amsl or 0) if self.flavour is PX4 else 0
         flies = of is not None and (self._unsent != of.token or not of.awaits_frame)
         asked = sender.asked
-        for event in sender.advance(self.seen, now_us, flies=flies):
+        awaited = sender.awaits_images
+        told = sender.advance(self.seen, now_us, flies=flies)
+        if sender.awaits_images:
+            self.images.hurry(now_us)
+        elif awaited:
+            events += self.images.expected_images(now_us)
+        for event in told:
             if isinstance(event, ports.CommandFailed) and of is not None:
                 of.over = True
             events.append(event)

@@ -100,6 +100,9 @@ class _Camera:
     unanswered: int = 0  # how often it was asked before anything was known
     restarts: int = 0
     deaf: bool = False  # it has restarted too often
+    lost: int = 0  # images of earlier series that are missing, and those that failed
+    failed: int = 0
+    counted_us: int | None = None  # when it last told how many images it has taken
     baseline: bool = False  # the next CAMERA_FEEDBACK may be of a picture from before
 
 
@@ -174,6 +177,7 @@ class ImageObserver:
         count, boot_ms = message.image_count, message.time_boot_ms
         if camera is None or camera.deaf or count < 0:
             return
+        camera.counted_us = now_us
         series = camera.series
         restarted = boot_ms < camera.boot_ms - REORDERED_MS
         camera.boot_ms = boot_ms if restarted else max(camera.boot_ms, boot_ms)
@@ -210,7 +214,7 @@ class ImageObserver:
         camera = self._camera(component, now_us)
         if camera is None or camera.deaf:
             return []
-        camera.answers = False
+        camera.answers, camera.counted_us = False, now_us
         series, index, utc_us = camera.series, message.img_idx, _utc(message.time_usec)
         baseline, camera.baseline = camera.baseline and series.first is None, False
         if baseline or utc_us is None or utc_us <= series.newest_us:
@@ -298,6 +302,8 @@ class ImageObserver:
         camera.deaf = camera.restarts >= MOST_SERIES
         ends = "; its further reports are left out" if camera.deaf else ""
         self.notes.append(f"camera {camera.component} counts its images anew{ends}")
+        camera.lost += sum(b - a + 1 for a, b in series.seen.gaps(series.first or 0, series.last))
+        camera.failed += series.failed
         camera.series = _Series(min(number, MOST_SERIES - 1), first, first - 1, newest_us=series.newest_us)
         camera.asked, camera.tries, camera.boot_ms, camera.completed = None, 0, 0, 0
         return camera.series
@@ -373,7 +379,31 @@ class ImageObserver:
         camera.until_us, self._next_us = now_us + ANSWER_US * self._slack, now_us + REQUEST_US
         yield messages.request_of(system, camera.component, CAPTURED, camera.asked)
 
+    def hurry(self, now_us: int) -> None:
+        """Ask each camera every second how many images it has taken, and not only now and then."""
+        for camera in self._cameras.values():
+            camera.due_us = min(camera.due_us, now_us + FIRST_US * self._slack)
+
     # ------------------------------------------------------------------------------------------ missing
+
+    def lacking(self, since_us: int) -> str:
+        """What is missing of the images, in words; empty if each camera has told since a time how many it took, and all
+        of these were reported, and none failed.
+        """
+        if not self._cameras:
+            return "no camera was heard"
+        if not any(camera.series.seen or camera.series.number for camera in self._cameras.values()):
+            return "no image was reported"
+        for camera in self._cameras.values():
+            series, of = camera.series, f"of camera {camera.component}"
+            missing = sum(b - a + 1 for a, b in series.seen.gaps(series.first or 0, series.last))
+            missing += camera.lost
+            failed = series.failed + camera.failed
+            if camera.counted_us is None or camera.counted_us < since_us:
+                return f"the number of images {of} is unknown"
+            if missing or failed:
+                return f"{missing} images {of} missing, {failed} failed"
+        return ""
 
     def expected_images(self, now_us: int) -> list[Event]:
         """Return the expected indices of each camera, for the list of those that are missing."""

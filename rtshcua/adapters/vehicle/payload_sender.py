@@ -45,6 +45,10 @@ ASK_US: Final = 200_000
 STEP: Final = 300
 #: the reason of a command that failed because payload that its contract requires did not work
 FAILED: Final = "payload"
+#: the reason of a command whose contract requires all images, of which some are missing
+IMAGES_MISSING: Final = "images-missing"
+#: how long the last pictures of a step may take, until cameras count them
+SETTLES_US: Final = 1_500_000
 #: the messages that tell about payload
 HEEDED: Final = frozenset(
     {"HEARTBEAT", "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK", "GIMBAL_DEVICE_ATTITUDE_STATUS"}
@@ -60,7 +64,7 @@ PICTURES: Final = frozenset(
     }
 )
 
-_ACCEPTED, _IN_PROGRESS = 0, 5
+_ACCEPTED, _TEMPORARILY_REJECTED, _IN_PROGRESS = 0, 1, 5
 _ATTITUDE: Final = "GIMBAL_DEVICE_ATTITUDE_STATUS"
 _YAW_LOCK, _IN_VEHICLE, _IN_EARTH = 16, 32, 64  # GIMBAL_DEVICE_FLAGS; the first one is also GIMBAL_MANAGER_FLAGS
 _UNIT: Final = 10_000_000  # 1e-7 degree in a degree
@@ -158,12 +162,20 @@ class PayloadSender:
     _images: dict[str, int] = field(default_factory=dict)  # the last index, by message
     _asked_us: int = 0
     _events: list[Event] = field(default_factory=list)
+    _flown_us: int | None = None  # when nothing but images was awaited any more
     _closing: bool = False  # what was begun is to be ended now
     _now_us: int = 0
     #: the height of home above sea in mm where heights are sent above sea, else 0
     datum: int = 0
+    #: what is missing of the images, in words, if cameras have told since a time how many they took; empty: nothing
+    lacking: Callable[[int], str] = lambda since_us: ""
     #: how often the autopilot was asked for an attitude
     asked: int = 0
+
+    @property
+    def awaits_images(self) -> bool:
+        """Whether the end of the step waits for images alone."""
+        return self._flown_us is not None
 
     @property
     def busy(self) -> bool:
@@ -182,7 +194,7 @@ class PayloadSender:
 
     def close(self) -> None:
         """The command is over, whoever flies now: what it began is ended, and nothing else is sent."""
-        self._schedules, self._ended, self._closing = [], None, True
+        self._schedules, self._ended, self._closing, self._flown_us = [], None, True, None
         for each in self._sendings:
             if not each.ends:
                 self._tell(self._now_us, each, "failed", "its step ended before its effect showed")
@@ -220,11 +232,13 @@ class PayloadSender:
             return
         if result == _IN_PROGRESS:
             found.until_us, found.due_us = now_us + found.frame.within_us, now_us + found.frame.within_us
+        elif result == _TEMPORARILY_REJECTED and found.tries < RETRIES:
+            found.due_us = now_us + RETRY_US  # a camera that is busy, as with the picture whose answer was lost
         elif result != _ACCEPTED:
             self._end(found, now_us, "failed", RESULTS.get(result, str(result)))
         else:
             found.acknowledged = True
-            if found.frame.success == EmissionSuccess.ACKNOWLEDGEMENT:
+            if found.frame.success in (EmissionSuccess.ACKNOWLEDGEMENT, EmissionSuccess.ALL_IMAGES):
                 self._end(found, now_us, "done", "acknowledged")
 
     def _waiting(self, command: int, component: int) -> Iterator[_Sending]:
@@ -397,9 +411,31 @@ class PayloadSender:
 
     def _finish(self, now_us: int) -> None:
         """Report the command's success once all commands of its end have ended."""
-        if self._ended is not None and not self._sendings and not any(each.owed for each in self._schedules):
-            self._events.append(Succeeded(now_us, self._ended.token))
+        if self._ended is None or self._sendings or any(each.owed for each in self._schedules):
+            return
+        if self._awaits_images(now_us, self._ended):
+            return
+        self._events.append(Succeeded(now_us, self._ended.token))
+        self._schedules, self._ended = [], None
+
+    def _awaits_images(self, now_us: int, ended: Succeeded) -> bool:
+        """Whether images are still awaited, or the step has failed without them."""
+        asking = [each.frame for each in self._schedules if each.frame.success == EmissionSuccess.ALL_IMAGES]
+        if not asking:
+            return False
+        if self._flown_us is None:
+            self._flown_us = now_us
+        lacking = self.lacking(self._flown_us + SETTLES_US)
+        if lacking and now_us < self._flown_us + max(each.within_us for each in asking):
+            return True
+        required = any(each.required for each in asking)
+        self._flown_us = None
+        if lacking:
+            self._events.append(PayloadOutcome(now_us, ended.token, "failed", lacking))
+        if lacking and required:
+            self._events.append(CommandFailed(now_us, ended.token, IMAGES_MISSING, lacking))
             self._schedules, self._ended = [], None
+        return bool(lacking and required)
 
     def _end(self, sending: _Sending, now_us: int, what: str, text: str) -> None:
         self._sendings.remove(sending)

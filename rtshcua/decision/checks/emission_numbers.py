@@ -39,10 +39,12 @@ _COMMANDS: Final = {
 }
 #: what shows the success of a command, besides its acknowledgement
 _SHOWN_BY: Final = {
-    203: EmissionSuccess.IMAGE,
-    2000: EmissionSuccess.IMAGE,
-    205: EmissionSuccess.ATTITUDE,
-    1000: EmissionSuccess.ATTITUDE,
+    203: {EmissionSuccess.IMAGE, EmissionSuccess.ALL_IMAGES},
+    206: {EmissionSuccess.ALL_IMAGES},
+    2000: {EmissionSuccess.IMAGE, EmissionSuccess.ALL_IMAGES},
+    2003: {EmissionSuccess.ALL_IMAGES},
+    205: {EmissionSuccess.ATTITUDE},
+    1000: {EmissionSuccess.ATTITUDE},
 }
 _PARAMETERS: Final = 7
 _HALF_TURN: Final = 1_800_000_000  # 1e-7 degree
@@ -71,8 +73,8 @@ def emission(emitted: Emission, contract: Contract, vehicle: VehicleLimits) -> I
             yield "a servo output that the vehicle does not declare free"
     yield from _moment(emitted, contract, vehicle)
     yield from within("required", emitted.required, 0, 1)
-    yield from within("success", emitted.success, EmissionSuccess.ACKNOWLEDGEMENT, EmissionSuccess.ATTITUDE)
-    if emitted.success not in (EmissionSuccess.ACKNOWLEDGEMENT, _SHOWN_BY.get(emitted.command)):
+    yield from within("success", emitted.success, EmissionSuccess.ACKNOWLEDGEMENT, EmissionSuccess.ALL_IMAGES)
+    if emitted.success not in {EmissionSuccess.ACKNOWLEDGEMENT, *_SHOWN_BY.get(emitted.command, ())}:
         yield f"success {emitted.success} does not follow command {emitted.command}"
     of_attitude = emitted.success == EmissionSuccess.ATTITUDE
     yield from within("bound", emitted.bound, int(of_attitude), _HALF_TURN if of_attitude else 0)

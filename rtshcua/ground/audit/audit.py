@@ -34,6 +34,8 @@ from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 from rtshcua.ground.audit.frames import FrameAudit
 from rtshcua.ground.audit.record_audit import UNENFORCED, RecordAudit
 from rtshcua.ground.audit.trust import Basis, establish
+from rtshcua.model.flat.contract import EmissionSuccess
+from rtshcua.wire.request import STEP
 
 Claims = tuple[tuple[Claim, ...], tuple[Claim, ...]]
 
@@ -162,7 +164,19 @@ class Auditor:
         flaw = None if self._meaning is None else self._meaning.check(record)
         if flaw is None and isinstance(record, Effect | Recover):
             flaw = self._images.check(record)
+        if flaw is None and isinstance(record, Effect) and self._requires_images(record):
+            flaw = self._images.incomplete()
         return flaw
+
+    def _requires_images(self, record: Effect) -> bool:
+        """Whether a record is the success of a step whose contract requires all images. Without derivation, which
+        follows replacements, the mission in force is unknown.
+        """
+        invocations = () if self._basis is None or self._meaning is None else self._basis.invocations
+        if record.event != "succeeded" or record.kind != STEP or not 0 <= record.step < len(invocations):
+            return False
+        emits = invocations[record.step].invocation.contract.emits
+        return any(each.success == EmissionSuccess.ALL_IMAGES and each.required for each in emits)
 
     def _begin(self, genesis: Genesis) -> Flaw | None:
         basis = establish(genesis, self._pinned, bundle=self._expected)

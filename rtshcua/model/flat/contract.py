@@ -112,6 +112,7 @@ class EmissionSuccess(IntEnum):
     ACKNOWLEDGEMENT = 0
     IMAGE = 1  # CAMERA_IMAGE_CAPTURED or CAMERA_FEEDBACK
     ATTITUDE = 2  # GIMBAL_DEVICE_ATTITUDE_STATUS, within a bound
+    ALL_IMAGES = 3  # an acknowledgement, and at the end of the step no image of the flight is missing
 
 
 class NumberOrigin(IntEnum):

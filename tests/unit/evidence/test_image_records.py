@@ -21,6 +21,7 @@ from rtshcua.evidence.image_records import (
     read_missing,
 )
 from rtshcua.evidence.records import Effect
+from virtual.rows import rows
 
 small = st.integers(-3, 40)
 
@@ -105,6 +106,32 @@ def test_the_ledger_and_an_independent_one_judge_alike(records: list[tuple[str, 
         assert (flaw is not None) == contradicted, (flaw, detail)
         if flaw is not None:
             return
+
+
+@rows(
+    ("told", "complete"),
+    [
+        ([], False),
+        ([0, 1], False),
+        ([0, 1, "list"], True),
+        ([0, 2, "list"], False),
+        ([0, 2, "list", 1], False),
+        ([0, 2, "list", 1, "list"], True),
+        ([0, None, "list"], False),
+        ([0, "list", None], False),
+    ],
+)
+def test_images_are_complete_only_by_a_list_that_is_up_to_date(told: list[int | str | None], complete: bool) -> None:
+    ledger = ImageLedger()
+    for each in told:
+        if each == "list":
+            record = effect(IMAGES_MISSING, encoded(ledger.missing(100, 0, 0, 0)))
+        else:
+            record = effect(IMAGE, encoded(image(index=each, result=0 if each is None else 1)))
+        assert ledger.check(record) is None
+    found = ledger.incomplete()
+    assert (found is None) == complete
+    assert found is None or found.slug == "image/incomplete"
 
 
 def test_other_effects_are_nothing_to_the_ledger() -> None:

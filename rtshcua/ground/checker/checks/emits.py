@@ -53,7 +53,8 @@ class Emittable(NamedTuple):
 
 _CAMERA: Final = ("camera", "vehicle")
 _GIMBAL: Final = ("gimbal", "vehicle")
-_IMAGE: Final = (EmissionSuccess.IMAGE,)
+_ALL: Final = (EmissionSuccess.ALL_IMAGES,)
+_IMAGE: Final = (EmissionSuccess.IMAGE, *_ALL)
 _ATTITUDE: Final = (EmissionSuccess.ATTITUDE,)
 _PLACE: Final = ("param5", "param6", "param7")
 #: every other command is refused: most move or arm the vehicle, or change its parameters
@@ -67,8 +68,8 @@ EMITTABLE: Final[Mapping[str, Emittable]] = MappingProxyType(
         "MAV_CMD_SET_CAMERA_ZOOM": Emittable(_CAMERA, ("param1", "param2"), ("param4", "param7")),
         "MAV_CMD_SET_CAMERA_FOCUS": Emittable(_CAMERA, ("param1",), ("param4", "param7")),
         "MAV_CMD_DO_DIGICAM_CONTROL": Emittable(_CAMERA, (), (), _IMAGE),
-        "MAV_CMD_DO_TRIGGER_CONTROL": Emittable(_CAMERA, ("param1",)),
-        "MAV_CMD_DO_SET_CAM_TRIGG_DIST": Emittable(_CAMERA, ("param1",)),
+        "MAV_CMD_DO_TRIGGER_CONTROL": Emittable(_CAMERA, ("param1",), (), _ALL),
+        "MAV_CMD_DO_SET_CAM_TRIGG_DIST": Emittable(_CAMERA, ("param1",), (), _ALL),
         "MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW": Emittable(
             _GIMBAL, (), ("param1", "param2", "param3", "param4"), _ATTITUDE
         ),

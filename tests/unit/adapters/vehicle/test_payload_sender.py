@@ -114,6 +114,15 @@ def test_what_nobody_answers_is_repeated_and_then_failed(carrier: Callable[[], C
     assert silent.told[-1] == ("failed", f"{START} to {silent.camera}, 1: no answer")
 
 
+def test_a_camera_that_is_busy_is_asked_again(carrier: Callable[[], Carrier]) -> None:
+    for busy, outcome in ((2, "done"), (9, "failed")):
+        one = carrier()
+        one.payload.answers = lambda command, busy=busy: 1 if command.confirmation < busy else 0  # type: ignore[misc]
+        one.begin(picture(EmissionMoment.BEGIN), kind=MotionKind.HOLD, hold_us=4_000_000)
+        assert isinstance(one.end(), Succeeded)
+        assert one.told[-1][0] == outcome, one.told
+
+
 def test_an_acknowledgement_is_no_picture(carrier: Callable[[], Carrier]) -> None:
     one = carrier()
     one.payload.captures = lambda number: number != 2

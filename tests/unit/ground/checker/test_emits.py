@@ -49,6 +49,7 @@ def test_interval_is_a_size_that_a_project_sets() -> None:
     [
         f"{START} at begin",
         f"{START} every 10 m succeeds with image within 3 s required",
+        f"{START} every 10 m succeeds with all_images within 20 s required",
         f"{START}, param2 = pause every 200 ms succeeds with acknowledgement within 60 s",
         f"{START} at each turn",
         f"{START} at each waypoint",
@@ -84,6 +85,8 @@ def test_emitted(emits: str) -> None:
         (f"{START} every 0 s", "E0319", "`0 s` must be above zero"),
         (f"{START} at end succeeds with attitude within 2 deg within 3 s", "E0431",
          "no attitude follows `MAV_CMD_IMAGE_START_CAPTURE`"),
+        (f"{POINT} at end succeeds with all_images within 9 s", "E0431",
+         "no all_images follows `MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW`"),
         (f"{START} at end succeeds with luck within 3 s", "E0431", "unknown success `luck`"),
         (f"{START} at end succeeds with image within 2 deg within 3 s", "E0431", "`2 deg` limits nothing here"),
         (f"{START} at end succeeds with image within 61 s", "E1003", "`61 s` is out of range"),

@@ -197,6 +197,9 @@ static bool ending_of(const rt_frame *frame, rt_ending *ending) {
     case RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST:
         *ending = (rt_ending){RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST, {0, 0, 0, four, 0, 0, 0}, to, 1 + RT_RETRIES};
         return one != 0;
+    case RT_MAV_CMD_DO_TRIGGER_CONTROL:
+        *ending = (rt_ending){RT_MAV_CMD_DO_TRIGGER_CONTROL, {0, keep, keep, 0, 0, 0, 0}, to, 1 + RT_RETRIES};
+        return one != 0 && one != keep && !rt_is_nan(one);
     case RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
         *ending = (rt_ending){RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, {give_back, give_back, keep, keep, 0, 0, seven}, to, 1 + RT_RETRIES};
         return one != give_back;

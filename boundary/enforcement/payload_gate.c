@@ -197,6 +197,9 @@ static bool ending_of(const rt_frame *frame, rt_ending *ending) {
     case RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST:
         *ending = (rt_ending){RT_MAV_CMD_DO_SET_CAM_TRIGG_DIST, {0, 0, 0, four, 0, 0, 0}, to, 1 + RT_RETRIES};
         return one != 0;
+    case RT_MAV_CMD_DO_TRIGGER_CONTROL:
+        *ending = (rt_ending){RT_MAV_CMD_DO_TRIGGER_CONTROL, {0, keep, keep, 0, 0, 0, 0}, to, 1 + RT_RETRIES};
+        return one != 0 && one != keep && !rt_is_nan(one);
     case RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
         *ending = (rt_ending){RT_MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, {give_back, give_back, keep, keep, 0, 0, seven}, to, 1 + RT_RETRIES};
         return one != give_back;
@@ -206,8 +209,8 @@ static bool ending_of(const rt_frame *frame, rt_ending *ending) {
 }
 
 static void forget(rt_payload_gate *gate, uint32_t at) {
-    memmove(&gate->endings[at], &gate->endings[at + 1], (gate->ending_count - at - 1) * sizeof gate->endings[0]);
-    gate->ending_count--;
+    for (; at + 1 < gate->ending_count && at + 1 < RT_MOST_ENDINGS; at++) gate->endings[at] = gate->endings[at + 1];
+    if (gate->ending_count > 0) gate->ending_count--;
 }
 
 static bool same_ending(const rt_ending *one, const rt_ending *other) {
@@ -220,16 +223,17 @@ static bool same_ending(const rt_ending *one, const rt_ending *other) {
 static void begun(rt_payload_gate *gate, const rt_frame *frame) {
     const uint16_t command = rt_u16(frame, RT_COMMAND_LONG_COMMAND);
     const uint32_t one = rt_u32(frame, RT_COMMAND_LONG_PARAM1);
-    rt_ending ending;
+    rt_ending ending = {0};
     const bool begins = ending_of(frame, &ending);
-    for (uint32_t at = gate->ending_count; at-- > 0;) {
+    for (uint32_t at = RT_MOST_ENDINGS; at-- > 0;) {
+        if (at >= gate->ending_count) continue;
         const rt_ending *each = &gate->endings[at];
         const bool ended = each->command == command && each->component == frame->target_component && (one == 0 || same_number(one, each->numbers[0]));
         if (begins ? same_ending(each, &ending) : ended) forget(gate, at);
     }
     if (!begins) return;
-    if (gate->ending_count == RT_MOST_ENDINGS) forget(gate, 0);
-    gate->endings[gate->ending_count++] = ending;
+    if (gate->ending_count >= RT_MOST_ENDINGS) forget(gate, 0);
+    if (gate->ending_count < RT_MOST_ENDINGS) gate->endings[gate->ending_count++] = ending;
 }
 
 rt_refusal rt_payload_refuse(rt_payload_gate *gate, const rt_frame *frame, int64_t now_us, uint8_t autopilot, bool home_known,
@@ -247,7 +251,7 @@ rt_refusal rt_payload_refuse(rt_payload_gate *gate, const rt_frame *frame, int64
             found = "frame/too-often";
         }
     }
-    for (uint32_t at = 0; at < gate->ending_count; at++) {
+    for (uint32_t at = 0; at < gate->ending_count && at < RT_MOST_ENDINGS; at++) {
         rt_ending *ending = &gate->endings[at];
         if (ending->command != rt_u16(frame, RT_COMMAND_LONG_COMMAND) || ending->component != frame->target_component ||
             !same_numbers(frame, ending->numbers, 7))

@@ -68,6 +68,7 @@ static void begin(rt_command *command) {
     ANY(gate);
     gate.payload.servos = command->servos;
     gate.payload.count = SIZE(1 + RT_MAX_EMISSIONS);
+    gate.payload.ending_count = SIZE(RT_MOST_ENDINGS);
     for (uint32_t at = 0; at <= RT_MAX_EMISSIONS; at++) {
         bound(&gate.payload.open[at].frame);
         gate.payload.open[at].sent = WITHIN(0, RT_MAX_VALUE);

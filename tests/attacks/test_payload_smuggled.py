@@ -13,7 +13,7 @@ from reference import payload_case as payload
 from reference.world import START
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.mavlink.parameters import NAN, nearest_bits
+from rtshcua.mavlink.parameters import NAN, nearest_bits, value_of
 from rtshcua.model.flat.contract import Addressee, Contract, Emission, EmissionMoment, MotionKind
 from rtshcua.onboard.enforcement.frames import OURS, FrameSession
 from rtshcua.onboard.enforcement.load import EnforcementMode, load
@@ -167,3 +167,12 @@ def test_a_camera_is_of_the_vehicle_that_was_heard() -> None:
     declared = payload_of(payload.contract((shot,)), payload.ARGUMENTS, 0, payload.policy())
     of.open(Command(7, "look", MotionKind.HOLD, (), (), 20_000, 0, payload=declared, not_after_us=AT))
     assert [passed(of, frame(2_000, 0, 0, 1, 0, 0, 0, nan, to=each)) for each in (105, 100)] == [0, 1]
+
+
+@pytest.mark.parametrize(("enable", "ends"), [(ONE, 4), (0, 0), (nearest_bits(-1, 1), 0), (NAN, 0)])
+def test_a_trigger_that_was_enabled_is_disabled_and_no_other(enable: int, ends: int) -> None:
+    of = gate(payload.emission(2_003, enable))
+    assert passed(of, frame(2_003, value_of(enable))) == 1
+    of.close()
+    assert passed(of, frame(2_003, 1), frame(2_003, 0, -1, -1, to=1)) == 0
+    assert passed(of, *(frame(2_003, 0, -1, -1) for _ in range(6))) == ends

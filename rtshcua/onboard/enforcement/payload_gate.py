@@ -6,9 +6,9 @@ often than declared: a frame that is sent once, once; one that is repeated, not 
 a distance is the time that the vehicle needs at its greatest speed. Each may be repeated `RETRIES` times with a rising
 `confirmation` (https://mavlink.io/en/services/command.html), so no more than four times what is declared ever leaves.
 
-What a step has begun may be ended afterwards too, at any time until it was ended: a series of pictures, a video, the
-control of a gimbal. The frame that ends it follows from the one that began it, is for the same component, and passes
-as often as one command with its retries.
+What a step has begun may be ended afterwards too, at any time until it was ended: a series of pictures, a video, a
+trigger, the control of a gimbal. The frame that ends it follows from the one that began it, is for the same component,
+and passes as often as one command with its retries.
 
 Which commands are payload at all is written down here, independently of the compiler and of the checks of a bundle.
 """
@@ -61,7 +61,7 @@ _CAMERAS: Final = range(enums.MAV_COMP_ID_CAMERA, enums.MAV_COMP_ID_CAMERA6 + 1)
 _GIMBALS: Final = (enums.MAV_COMP_ID_GIMBAL, *range(enums.MAV_COMP_ID_GIMBAL2, enums.MAV_COMP_ID_GIMBAL6 + 1))
 _AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
 _ONE: Final = nearest_bits(1, 1)
-_KEEP: Final = nearest_bits(-1, 1)  # who controls a gimbal,
+_KEEP: Final = nearest_bits(-1, 1)  # what a trigger does, who controls a gimbal,
 _GIVE_BACK: Final = nearest_bits(-3, 1)  # and that it is no longer the sender
 
 _fields: Final = LAYOUTS[COMMAND_LONG].getter(
@@ -172,6 +172,8 @@ def ending_of(command: int, numbers: tuple[int, ...]) -> tuple[int, tuple[int, .
             return enums.MAV_CMD_VIDEO_STOP_CAPTURE, (one, three, NAN, NAN, 0, 0, NAN)
         case enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST if one:
             return command, (0, 0, 0, four, 0, 0, 0)
+        case enums.MAV_CMD_DO_TRIGGER_CONTROL if one not in (0, _KEEP, NAN):
+            return command, (0, _KEEP, _KEEP, 0, 0, 0, 0)
         case enums.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE if one != _GIVE_BACK:
             return command, (_GIVE_BACK, _GIVE_BACK, _KEEP, _KEEP, 0, 0, seven)
     return None

@@ -612,15 +612,22 @@ def _unlogged_payload(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
         commands = list(_commands(records_of(life), flown.start_us))
         for frame, (number, ends) in sent:
             begun = [each for each in commands if each.at_us <= frame.sent_us]
-            if not life.began_us <= frame.sent_us <= life.ended_us or (ends and begun):
-                continue
-            may_be = [each.skill for each in begun if each.at_us == frame.sent_us or each is begun[-1]]
-            if not any(number in declared.get(skill, ()) for skill in may_be):
-                why = f", but the last command was `{begun[-1].skill}`" if begun else ", but no command was dispatched"
-                yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent{why}")
+            if life.began_us <= frame.sent_us <= life.ended_us and not (ends and begun):
+                why = _undeclared(number, frame.sent_us, begun, declared)
+                if why:
+                    yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent{why}")
     for frame, _ in sent:
         if not any(life.began_us <= frame.sent_us <= life.ended_us for life in flown.lives):
             yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")
+
+
+def _undeclared(number: int, sent_us: int, begun: Sequence[_Sent], declared: Mapping[str, frozenset[int]]) -> str:
+    """Return why a command to payload belongs to no dispatched command; empty if it may belong to one."""
+    if not begun:
+        return ", but no command was dispatched"
+    may_be = (each.skill for each in begun if each.at_us == sent_us or each is begun[-1])
+    allowed = any(number in declared.get(skill, ()) for skill in may_be)
+    return "" if allowed else f", but the last command was `{begun[-1].skill}`"
 
 
 def _commands(records: Sequence[dict[str, Any]], start_us: int) -> Iterator[_Sent]:

@@ -53,11 +53,10 @@ def takes_pictures(skill: SkillDecl) -> bool:
 def prove_commanded(proof: ProofContext, skill: SkillDecl, pictures: PicturesDecl, camera: CameraDecl) -> None:
     """Report commands that take pictures more rarely than the skill states, or faster than the camera can."""
     every, taking = pictures.every, [each for each in skill.emits if each.command.text in TAKING]
-    if every is None or not taking or any(each.command.text == BY_ITSELF for each in taking):
+    by_itself = BY_ITSELF in {each.command.text for each in taking}
+    if every is None or not taking or by_itself:
         return
-    assert skill.motion is not None
-    named = skill.motion.speed
-    speed = (named and proof.context.arguments(skill)[named.text].high) or proof.policy.vehicle.speed
+    speed = _greatest_speed(proof, skill)
     stated = Spacing(every.value, every.dimension, every.span)
     spaced = [found for each in taking for found in _spacing(proof, skill, each)]
     if not spaced:
@@ -67,10 +66,14 @@ def prove_commanded(proof: ProofContext, skill: SkillDecl, pictures: PicturesDec
         if each.time(speed) < camera.interval.value:
             _too_fast(proof, each, speed, camera)
     closest = min(spaced, key=lambda each: each.distance(speed))
-    same = closest.dimension is stated.dimension
-    rarer = closest.value > stated.value if same else closest.distance(speed) > stated.distance(speed)
-    if rarer:
+    if closest.distance(speed) > stated.distance(speed):
         _too_rare(proof, closest, stated, speed)
+
+
+def _greatest_speed(proof: ProofContext, skill: SkillDecl) -> int:
+    assert skill.motion is not None
+    named = skill.motion.speed
+    return (named and proof.context.arguments(skill)[named.text].high) or proof.policy.vehicle.speed
 
 
 def _spacing(proof: ProofContext, skill: SkillDecl, emits: EmitsDecl) -> Iterator[Spacing]:

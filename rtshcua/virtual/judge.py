@@ -35,7 +35,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Auditor
 from rtshcua.model.faults import FlightMode
-from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.contract import Contract, MotionKind
 from rtshcua.model.step_number import step_words
 from rtshcua.virtual.excuses import Excuses, JudgedFailure
 from rtshcua.virtual.flight_record import ScenarioFlown, SentFrame, TruthSample, records_of
@@ -597,9 +597,7 @@ def _payload(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
     """Yield commands to payload that were sent outside of a step whose skill emits them, except those that end what
     such a step began.
     """
-    emitted = {each.name: frozenset(one.command for one in each.emits) for each in flown.policy.contracts}
-    for name, commands in emitted.items():
-        emitted[name] = commands | ({_CONTROL} if _POINT in commands else set())
+    emitted = {each.name: _may_send(each) for each in flown.policy.contracts}
     sent = [(frame, message) for frame in flown.frames if (message := _payload_command(frame.octets)) is not None]
     for life in flown.lives:
         commands_sent = list(_commands(records_of(life), flown.start_us))
@@ -612,6 +610,12 @@ def _payload(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
     for frame, _ in sent:
         if not any(life.began_us <= frame.sent_us <= life.ended_us for life in flown.lives):
             yield JudgedFailure("unlogged-effect", frame.sent_us, f"{_name(frame)} was sent while no process ran")
+
+
+def _may_send(contract: Contract) -> frozenset[int]:
+    """Return the commands to payload that a contract emits or implies."""
+    commands = frozenset(each.command for each in contract.emits)
+    return commands | {_CONTROL} if _POINT in commands else commands
 
 
 def _payload_command(octets: bytes) -> Any:

@@ -11,8 +11,8 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 871,
-    "code lines": 104_000,  # to the thousand; rises with each feature: last the report of a flight
+    "modules": 908,  # rises with each subject: last cameras, survey geometry and the formats of others
+    "code lines": 112_000,  # to the thousand; rises with each feature: last cameras, surveys, imports
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 69,
@@ -21,7 +21,7 @@ HELD = {
     "functions of more than 60 lines": 0,
     "functions of a complexity over 15": 66,
     "functions of a complexity over 25": 0,
-    "lines of application logic in the command line": 893,
+    "lines of application logic in the command line": 890,
 }
 
 

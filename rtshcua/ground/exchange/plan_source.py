@@ -5,6 +5,7 @@ both.
 """
 
 from collections.abc import Iterator, Sequence
+from decimal import Decimal
 from math import isqrt
 from typing import Final, NamedTuple
 
@@ -27,7 +28,7 @@ from rtshcua.ground.exchange.zone_source import SourceNames, SourceZone, circle_
 from rtshcua.ground.gateway.translation import SEA_FRAMES
 from rtshcua.ground.geometry.projection import projection_at
 from rtshcua.mavlink import enums
-from rtshcua.model.flat.zone import project
+from rtshcua.model.flat.zone import Projection, project
 
 #: the highest altitude and the longest duration that the library's skills can be sized for
 _HIGHEST_MM, _LONGEST_S = 500_000, 1_800
@@ -97,16 +98,12 @@ class PlanExtent(NamedTuple):
 def extent_of(plan: QgcPlan, home: GeoPoint, surveys: Sequence[CoveredSurvey] = ()) -> PlanExtent:
     """The extent of a plan around a home. Its surveys begin after the flights at their places."""
     plane = projection_at(home.latitude, home.longitude)
-    speeds = [each.params[1] or 0 for each in plan.items if each.command == enums.MAV_CMD_DO_CHANGE_SPEED]
+    speeds = _speeds(plan)
     slowest = min((int(each * 1000) for each in speeds if each >= 1), default=CRUISE)
     ends = {each.place: each for each in surveys}
     way, legs = [(0, 0, 0)], [0]
     for item in flying_items(plan):
-        latitude, longitude = item.params[4:6]
-        place = way[-1][:2]
-        if latitude and longitude:
-            place = project(plane, degrees_e7(latitude), degrees_e7(longitude))
-        way.append((*place, _above_home(item, plan.home_above_sea)))
+        way.append((*_place_of(item, plane, way[-1][:2]), _above_home(item, plan.home_above_sea)))
         legs.append(_leg_s(way[-2], way[-1], slowest))
         if item.place in ends:
             way.append((*ends[item.place].end, ends[item.place].highest))
@@ -120,6 +117,16 @@ def extent_of(plan: QgcPlan, home: GeoPoint, surveys: Sequence[CoveredSurvey] = 
         len(way) + len(surveys),
         sum(each.seconds for each in surveys),
     )
+
+
+def _speeds(plan: QgcPlan) -> list[Decimal | int]:
+    return [each.params[1] or 0 for each in plan.items if each.command == enums.MAV_CMD_DO_CHANGE_SPEED]
+
+
+def _place_of(item: QgcItem, plane: Projection, last: tuple[int, int]) -> tuple[int, int]:
+    """The place of an item in the local plane; the last one if it names none."""
+    latitude, longitude = item.params[4:6]
+    return project(plane, degrees_e7(latitude), degrees_e7(longitude)) if latitude and longitude else last
 
 
 def _leg_s(begin: tuple[int, int, int], end: tuple[int, int, int], slowest: int) -> int:

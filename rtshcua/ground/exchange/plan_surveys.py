@@ -158,7 +158,10 @@ def _check_legs(plan: QgcPlan, one: QgcSurvey) -> None:
         raise NoSurvey("its height is not above home")
     if any(each.params[6] is None or abs(each.params[6] * 1000 - one.distance) > 1 for each in flights):
         raise NoSurvey("its height is not the distance of its camera")
-    others = [each for each in legs if each.command != WAYPOINT]
+    _check_others([each for each in legs if each.command != WAYPOINT])
+
+
+def _check_others(others: Sequence[QgcItem]) -> None:
     if any(IGNORED.get(each.command) != "camera" for each in others):
         raise NoSurvey("it has other commands than flights and pictures")
     if not any(each.command in _TRIGGERS and each.params[_TRIGGERS[each.command]] for each in others):

@@ -295,6 +295,11 @@ class PlanSteps:
         if command == enums.MAV_CMD_NAV_TAKEOFF and self._translation.flies_after_takeoff(item, self._now_us):
             there = item._replace(fields=item.fields | {"command": WAYPOINT, "param1": 0.0})
             return self._append(number, item) or self._append(number, there)
+        return self._append_at_its_place(number, item)
+
+    def _append_at_its_place(self, number: int, item: Received) -> RefusedPlan | None:
+        """Append an item; before one that holds or lands at a place that its skill does not take, the flight there."""
+        command = item.fields["command"]
         if has_place(item) and self._translation.row(ITEM, command, item) is None:
             there = item._replace(fields=item.fields | {"x": 0, "y": 0})
             row = self._translation.row(ITEM, command, there)

@@ -27,7 +27,7 @@ def _shorten(part: msgspec.Struct, made: Any) -> None:
         if isinstance(value, tuple):
             for each, its in zip(value, inner, strict=True):
                 _shorten(each, its)
-        elif value is not None:
+        else:
             _shorten(value, inner)
     if isinstance(part, Extended):
         defaults = type(part).__struct_defaults__

@@ -99,6 +99,24 @@ def test_legs_between_the_same_heights_are_one_part() -> None:
     ]  # fmt: skip
 
 
+def test_a_path_of_one_point_is_a_part_at_its_height() -> None:
+    planner = Planner(MotionKind.COVER, (3 * M, 4 * M), 9 * M, 0, heights=(7 * M,))
+    parts = planner.volume([point(0)] * 4, KNOWN).place.parts
+    assert [(sweep.path, low // M, high // M) for sweep, low, high in parts] == [
+        ((0, 0, 3 * M, 4 * M), 0, 7), ((3 * M, 4 * M), 7, 7),
+    ]  # fmt: skip
+
+
+def test_the_path_is_the_same_wherever_the_vehicle_is() -> None:
+    """Only the leg to its first point changes, so its answers about zones are kept."""
+    planner = Planner(MotionKind.COVER, (0, 0, 9 * M, 0), 9 * M, 0, heights=(5 * M, 9 * M))
+    here, there = (planner.volume([point(x), point(0), point(5 * M), point(0)], KNOWN).place for x in (0, 5 * M))
+    assert here.parts[0] != there.parts[0]
+    assert here.parts[1:] == there.parts[1:]
+    zone = PreparedZone(0, flat.ZONES[flat.CITY])
+    assert here.inside(zone) == there.inside(zone) == PlaceSet(there.parts, 0, 0).inside(zone)
+
+
 def drawn_zone(of: Random) -> Zone:
     zone = worlds.zone(of)
     return replace(zone, floor=of.choice([LOWEST, 0, 5 * M]), ceiling=of.choice([12 * M, 20 * M, 30 * M]))

@@ -15,12 +15,13 @@ from rtshcua.evidence.image_records import (
     ImageDetail,
     ImageLedger,
     IndexSet,
+    MissingDetail,
     encoded,
     missing_of,
     read_image,
     read_missing,
 )
-from rtshcua.evidence.records import Effect
+from rtshcua.evidence.records import Effect, Recover
 from virtual.rows import rows
 
 small = st.integers(-3, 40)
@@ -69,6 +70,92 @@ def test_details_are_canonical_and_read_back() -> None:
     many = missing_of(100, 0, seen, 0, 199, 3)
     assert (many.missing, len(many.lost), many.taken, many.failed) == (100, MOST_GAPS, 100, 3)
     assert read_missing(encoded(many)) == many
+
+
+def test_ranges_are_joined_in_each_order() -> None:
+    found = IndexSet()
+    assert (found.lowest, found.highest, found.last_missing(0, 3)) == (None, None, 3)
+    assert [found.add(index) for index in (5, 6, 4, 9, 8, 7, 5)] == [True] * 6 + [False]
+    assert (found.lowest, found.highest, len(found)) == (4, 9, 6)
+    assert list(found.gaps(2, 11)) == [(2, 3), (10, 11)]
+    assert (found.last_missing(4, 9), found.last_missing(2, 9), found.last_missing(0, 20)) == (None, 3, 20)
+    found.add(20)
+    assert list(found.gaps(0, 9)) == [(0, 3)]
+
+
+def listed(**changed: Any) -> str:
+    """The list after images 0 and 2 of camera 100, changed."""
+    fields = dict[str, Any](camera=100, failed=0, first=0, last=3, lost=((1, 1), (3, 3)), missing=2, series=0, taken=2)
+    return encoded(MissingDetail(**(fields | changed)))
+
+
+@rows(
+    ("event", "detail", "code"),
+    [
+        (IMAGE, "no JSON", "image/malformed"),
+        (IMAGE, encoded(image(index=3)).replace(":", ": ", 1), "image/malformed"),
+        (IMAGE, encoded(image(index=0)), "image/twice"),
+        (IMAGE, encoded(image(index=7, series=2)), "image/series"),
+        (IMAGE, encoded(image(index=7, series=1)), None),
+        (IMAGE, encoded(image(index=None, result=0)), None),
+        (IMAGES_MISSING, "no JSON", "image/malformed"),
+        (IMAGES_MISSING, listed(), None),
+        (IMAGES_MISSING, listed(missing=1), "image/missing"),
+        (IMAGES_MISSING, listed(last=1, lost=((1, 1),), missing=1), "image/missing"),
+        (IMAGES_MISSING, listed(camera=101, lost=((0, 3),), missing=4, taken=0), None),
+        ("landed", "", None),
+    ],
+)
+def test_records_that_contradict_those_before_are_flaws(event: str, detail: str, code: str | None) -> None:
+    ledger = ImageLedger()
+    for index in (0, 2):
+        assert ledger.check(effect(IMAGE, encoded(image(index=index)))) is None
+    found = ledger.check(effect(event, detail))
+    assert (None if found is None else found.slug) == code
+
+
+AFTER_A_CRASH = Recover("0" * 64, 1, 0, None, "0" * 64, 0, "0" * 64, 0, "0" * 64, 0, 1, "recover", 1, 1)
+
+
+@rows(
+    ("details", "complete"),
+    [
+        ([(IMAGES_MISSING, listed())], False),
+        ([(IMAGES_MISSING, listed(last=2, lost=((1, 1),), missing=1))], False),
+        ([(IMAGE, encoded(image(index=1))), (IMAGES_MISSING, listed(last=2, lost=(), missing=0, taken=3))], True),
+        ([(IMAGE, encoded(image(index=1)))], False),
+        (
+            [
+                (IMAGE, encoded(image(index=1))),
+                (IMAGE, encoded(image(index=None, result=0))),
+                (IMAGES_MISSING, listed(last=2, lost=(), missing=0, taken=3, failed=1)),
+            ],
+            False,
+        ),
+    ],
+)
+def test_a_step_that_requires_all_images_needs_a_list_without_gaps(
+    details: list[tuple[str, str]], complete: bool
+) -> None:
+    ledger = ImageLedger()
+    for index in (0, 2):
+        ledger.check(effect(IMAGE, encoded(image(index=index))))
+    for event, detail in details:
+        assert ledger.check(effect(event, detail)) is None
+    assert (ledger.incomplete() is None) == complete
+
+
+def test_what_is_missing_counts_failed_pictures_and_begins_anew_after_a_crash() -> None:
+    ledger = ImageLedger()
+    for one in (image(index=0), image(index=None, result=0), image(index=2)):
+        assert ledger.check(effect(IMAGE, encoded(one))) is None
+    assert (ledger.taken, ledger.failed) == (2, 1)
+    told = ledger.missing(100, 0, 1, 1)
+    assert (told.first, told.last, told.lost, told.failed, told.taken) == (0, 2, ((1, 1),), 1, 2)
+    assert ledger.missing(101, 0, 0, 1).missing == 2
+    ledger.check(AFTER_A_CRASH)
+    assert ledger.incomplete() is not None, "no list of this run"
+    assert ledger.check(effect(IMAGE, encoded(image(index=0)))) is None
 
 
 @st.composite

@@ -27,6 +27,7 @@ from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import RuleKind
+from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.ir.places import CameraDecl
 from rtshcua.model.ir.skills import MotionDecl, ParameterDecl, PicturesDecl, SkillDecl
@@ -259,14 +260,21 @@ def _limit(proof: ProofContext, skill: SkillDecl, flown: SurveyRange, fault: Pic
     return None if range is None else RangeEnd(range.high.span, _ends(proof, skill, name)[0])
 
 
+def _least_size(skill: SkillDecl, name: str | None) -> int:
+    """Return the least value that a size may be set to; 0 if that is not written as a value."""
+    ranges = [each.range for each in skill.sizes if each.name.text == name and each.range is not None]
+    return next((each.low.value for each in ranges if isinstance(each.low, Quantity)), 0)
+
+
 def _report(proof: ProofContext, skill: SkillDecl, camera: CameraDecl, flown: SurveyRange, fault: PictureFault) -> None:
     """Report a fault at the end of the range that causes it, at the spacing, or else at the demand."""
     demand = getattr(skill.pictures, fault.part).span
     limit = _limit(proof, skill, flown, fault)
-    accepted = fault.accepted if limit is not None and fault.accepted and fault.accepted.value >= limit.least else None
     span = demand if limit is None else limit.span
     size = named_at(proof.report, skill, span)
-    help = _CHANGE["no speed" if limit is None else fault.change]
+    least = 0 if limit is None else max(limit.least, _least_size(skill, size))
+    accepted = fault.accepted if limit is not None and fault.accepted and fault.accepted.value >= least else None
+    help = _CHANGE["no speed" if limit is None else "blur" if fault.part == "blur" else fault.change]
     if accepted is not None:
         text = f"write `sizes {skill.name.text}({size} = {accepted.text})`"
         help = text if size is not None else f"nearest accepted: `{accepted.text}`"
@@ -284,8 +292,10 @@ def _report(proof: ProofContext, skill: SkillDecl, camera: CameraDecl, flown: Su
 #: what to change where no value of a range keeps a demand
 _CHANGE: Final = {
     "distance": "no value of the range keeps it: demand less, or declare a camera with a longer focal length",
-    "every": "no spacing keeps it: demand less, or raise the least height",
-    "speed": "no speed of the range keeps it: raise the spacing or the least height, or demand less",
+    "every": "no spacing of the range keeps it: demand less, or raise the least height or distance",
+    "speed": "no speed of the range keeps it: raise the spacing, or declare a camera with a shorter interval",
+    "blur": "no speed of the range keeps it: demand less, raise the least height or distance, or declare a camera with "
+    "a shorter exposure",
     "no speed": "the motion sets no speed, so the vehicle's greatest counts: give the motion a `speed` with a range",
 }
 

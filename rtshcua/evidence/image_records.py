@@ -19,6 +19,8 @@ from rtshcua.evidence.records import Count, Effect, Integer, Recover
 IMAGE: Final = "image"
 #: the event of an effect whose detail is a `MissingDetail`
 IMAGES_MISSING: Final = "images-missing"
+#: the event of an effect of a command to payload that failed
+PAYLOAD_FAILED: Final = "payload.failed"
 #: how many gaps are listed
 MOST_GAPS: Final = 32
 

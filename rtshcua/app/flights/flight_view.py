@@ -136,7 +136,7 @@ def _images(flight: Flight, images: FlightImages) -> Iterator[ImageView]:
 
 
 def _gaps_of_images(images: FlightImages) -> Iterator[GapView]:
-    """Yield the last list of missing images of each camera that has some."""
+    """Yield the last list of missing images of each camera that has some, and what failed."""
     for each in images.missing:
         if each.missing:
             lost = ", ".join(str(low) if low == high else f"{low} to {high}" for low, high in each.lost)
@@ -144,6 +144,8 @@ def _gaps_of_images(images: FlightImages) -> Iterator[GapView]:
             yield GapView("images", f"{each.missing} of camera {each.camera}: {lost}{more}")
     if images.failed:
         yield GapView("images", f"{many(len(images.failed), 'picture')} failed, as the camera reported")
+    if images.commands_failed:
+        yield GapView("payload", f"{many(images.commands_failed, 'command')} to cameras or other payload failed")
 
 
 def _log_ends_us(flight: Flight) -> int | None:

@@ -428,6 +428,7 @@ class FlightSession:
             images_taken=self._teller.images.taken,
             images_missing=self._teller.images.missing,
             images_failed=self._teller.images.failed,
+            payload_failed=self._teller.images.commands_failed,
             folder=str(self._run.path),
             log=log,
             next=f"rtshcua verify-log {'--audit ' if self._loaded.boundary.lost else ''}{shlex.quote(log)}",

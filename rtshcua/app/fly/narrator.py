@@ -23,7 +23,7 @@ from rtshcua.app.fly.story import (
 )
 from rtshcua.app.fly.view_ports import LiveView
 from rtshcua.decision.outline import rings
-from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, read_image, read_missing
+from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, PAYLOAD_FAILED, read_image, read_missing
 from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
@@ -140,10 +140,12 @@ def _outline(zone: Zone) -> Iterator[tuple[int, ...]]:
 
 
 class ImageCounts:
-    """The images of a flight in numbers: taken, failed, and missing by the last lists."""
+    """The images of a flight in numbers: taken, failed, and missing by the last lists; and the commands to payload that
+    failed.
+    """
 
     def __init__(self) -> None:
-        self.taken = self.failed = 0
+        self.taken = self.failed = self.commands_failed = 0
         self._missing: dict[tuple[int, int], int] = {}
 
     @property
@@ -158,6 +160,8 @@ class ImageCounts:
             self.failed += 1 - image.result
         elif event == IMAGES_MISSING and (told := read_missing(detail)) is not None:
             self._missing[told.camera, told.series] = told.missing
+        elif event == PAYLOAD_FAILED:
+            self.commands_failed += 1
 
 
 class Teller:

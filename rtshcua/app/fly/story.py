@@ -105,6 +105,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     without an observed landing. `may_fly`: why the vehicle may still fly unwatched. `drain_*` is the charge used in the
     worst minute, `km_*` per km over ground, both in 1/10000; a measured 0 means not measured. `battery` is that as
     text. `images_*` are the images that cameras reported, those that are missing, and pictures that failed.
+    `payload_failed` counts the commands to payload that failed, also those that no camera answered.
     """
 
     mission: str
@@ -135,6 +136,7 @@ class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
     images_taken: int = 0
     images_missing: int = 0
     images_failed: int = 0
+    payload_failed: int = 0
 
 
 Message = FlightPlanView | Snapshot | Happened | Note | Summary

@@ -6,7 +6,15 @@ from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.image_records import IMAGE, IMAGES_MISSING, ImageDetail, MissingDetail, read_image, read_missing
+from rtshcua.evidence.image_records import (
+    IMAGE,
+    IMAGES_MISSING,
+    PAYLOAD_FAILED,
+    ImageDetail,
+    MissingDetail,
+    read_image,
+    read_missing,
+)
 from rtshcua.evidence.records import Effect
 from rtshcua.ground.flight.flown import Flight
 
@@ -33,12 +41,13 @@ class FlightImage(NamedTuple):
 
 class FlightImages(NamedTuple):
     """The images of a flight: those that were taken, in the order of camera, series and index; pictures that failed;
-    and the last list of missing ones for each camera and series.
+    the last list of missing ones for each camera and series; and how many commands to payload failed.
     """
 
     taken: tuple[FlightImage, ...]
     failed: tuple[FlightImage, ...]
     missing: tuple[MissingDetail, ...]
+    commands_failed: int
 
     @property
     def lost(self) -> int:
@@ -57,6 +66,7 @@ def images_of(flight: Flight) -> FlightImages:
     """The images in the records of a flight; records that make no sense are left out."""
     taken, failed = list[FlightImage](), list[FlightImage]()
     missing: dict[tuple[int, int], MissingDetail] = {}
+    commands_failed = 0
     for record in flight.records:
         if not isinstance(record, Effect):
             continue
@@ -65,7 +75,9 @@ def images_of(flight: Flight) -> FlightImages:
             (failed if detail.index is None else taken).append(found)
         elif record.event == IMAGES_MISSING and (told := read_missing(record.detail)) is not None:
             missing[told.camera, told.series] = told
-    return FlightImages(tuple(sorted(taken, key=_order)), tuple(failed), tuple(missing.values()))
+        elif record.event == PAYLOAD_FAILED:
+            commands_failed += 1
+    return FlightImages(tuple(sorted(taken, key=_order)), tuple(failed), tuple(missing.values()), commands_failed)
 
 
 def _order(image: FlightImage) -> tuple[int, int, int]:

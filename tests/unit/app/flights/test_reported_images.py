@@ -15,7 +15,7 @@ from rtshcua.front.cli.render.live.lines import ending
 from rtshcua.ground.flight.flight_content import FlightReport
 from rtshcua.ground.flight.flight_page import page
 from virtual import case
-from virtual.flight_reports import report_of
+from virtual.flight_reports import report_of, told
 
 HOME = case.policy().projection
 
@@ -95,18 +95,26 @@ def test_images_are_counted_for_the_summary() -> None:
     assert (counts.taken, counts.failed, counts.missing) == (taken, len(details()) - taken, 1)
     counts.add("image", "nonsense")
     counts.add("images-missing", "{}")
-    assert (counts.taken, counts.missing) == (taken, 1)
+    counts.add("payload.failed", "2000 to 1, 7: unsupported")
+    assert (counts.taken, counts.missing, counts.commands_failed) == (taken, 1, 1)
+
+
+def test_the_page_names_commands_to_payload_that_failed(tmp_path: Path) -> None:
+    lines = [line.replace(b'"event":"image"', b'"event":"payload.failed"') for line in flown()]
+    gaps = {each.told for each in told(lines, tmp_path).gaps if each.what == "payload"}
+    assert gaps == {f"{len(details())} commands to cameras or other payload failed"}
 
 
 def test_the_summary_of_a_run_names_images_only_where_there_are_some() -> None:
     summary = Summary(
         mission="m", policy="p@1", vehicle="v", flavour="px4", mode="software", ending="completed", exit_code=0,
         steps=1, steps_done=1, outcomes={}, flight_us=1, records=1, whole=True, folder="f", log="l", next="n",
-        images_taken=34, images_missing=1, images_failed=2,
+        images_taken=34, images_missing=1, images_failed=2, payload_failed=173,
     )  # fmt: skip
+    assert "  payload  173 commands failed" in list(ending(summary))
     assert "  images   34 recorded, 1 missing, 2 pictures failed" in list(ending(summary))
     none = Summary(
         mission="m", policy="p@1", vehicle="v", flavour="px4", mode="software", ending="completed", exit_code=0,
         steps=1, steps_done=1, outcomes={}, flight_us=1, records=1, whole=True, folder="f", log="l", next="n",
     )  # fmt: skip
-    assert not any("images" in line for line in ending(none))
+    assert not any("images" in line or "payload" in line for line in ending(none))

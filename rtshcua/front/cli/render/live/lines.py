@@ -121,6 +121,8 @@ def _ending(summary: Summary) -> Iterable[str]:
     if summary.images_taken or summary.images_missing or summary.images_failed:
         failed = f", {many(summary.images_failed, 'picture')} failed" if summary.images_failed else ""
         yield f"  images   {summary.images_taken} recorded, {summary.images_missing} missing{failed}"
+    if summary.payload_failed:
+        yield f"  payload  {many(summary.payload_failed, 'command')} failed"
     if summary.may_fly:
         yield f"  vehicle  {summary.may_fly}"
     yield from (f"  battery  {what}" for what in summary.battery)

@@ -49,7 +49,11 @@ _KEYWORD = re.compile(r"\b(import|test|scenario|at)\s+\Z")
 
 _EXPONENT = re.compile(r"(?<![A-Za-z0-9_.])[0-9][0-9_.]*[eE][0-9]*\s*\Z")
 _SIGNED = re.compile(r"-\s*([0-9][0-9_.]*)\s*([NSEW])\b")
+_LETTER_FIRST = re.compile(r"[NSEW][0-9]*")
+_COORDINATES = "write latitude and longitude as in `47.3977 N, 8.5456 E`"
 _OPPOSITE = {"N": "S", "S": "N", "E": "W", "W": "E"}
+_NAMELESS = re.compile(r"\bproposed\s+by\s+(agent|operator)\s+(for\s+)\Z")
+_BARE = re.compile(r"([0-9][0-9_.]*)\s+(?:by|focal|pixels)\s+\Z")
 _FILE = re.compile(r"<([^<>\"\n]*)>|([^\s\"<>]+)")
 _LAST = re.compile(r"[A-Za-z0-9_.]+\Z|\S\Z")
 LOOK_BACK = 80  # characters before a failure that are searched for the keyword of an unfinished part
@@ -75,7 +79,15 @@ class Stop(NamedTuple):
 
 def recognise(stop: Stop, values: list[Any]) -> Advice | None:
     """Return the advice for a notation of other languages; `values` is the stack of the parser."""
-    return _string(stop) or _equality(stop) or _other_word(stop) or _missing_role(stop, values) or _number(stop)
+    return (
+        _string(stop)
+        or _equality(stop)
+        or _other_word(stop)
+        or _missing_role(stop, values)
+        or _proposer(stop)
+        or _length(stop)
+        or _number(stop)
+    )
 
 
 def _string(stop: Stop) -> Advice | None:
@@ -126,8 +138,28 @@ def _missing_role(stop: Stop, values: list[Any]) -> Advice | None:
     return Advice("add the role: `by role operator when ...` for one role, `by any when ...` for all", fix)
 
 
+def _proposer(stop: Stop) -> Advice | None:
+    """`proposed by operator for role operator`: `for` was read as the name."""
+    nameless = _NAMELESS.search(stop.before) if stop.found == "role" else None
+    if nameless is None:
+        return None
+    start = stop.span.start - len(nameless[2])
+    at = Span(stop.span.file, start, start + len("for")), f"expected the name of the proposer after `{nameless[1]}`"
+    return Advice(f"write who proposes, as in `proposed by {nameless[1]} ada for role operator`", at=at)
+
+
+def _length(stop: Stop) -> Advice | None:
+    """A length of a camera without its unit: the next word was read as the unit."""
+    bare = _BARE.search(stop.before) if stop.symbols & {"by", "focal", "pixels"} else None
+    if bare is None:
+        return None
+    start = stop.span.start - len(bare[0])
+    at = Span(stop.span.file, start, start + len(bare[1])), f"`{bare[1]}` has no unit"
+    return Advice(f"write `{bare[1]} mm`", at=at)
+
+
 def _number(stop: Stop) -> Advice | None:
-    """A signed coordinate, an exponent or a decimal comma."""
+    """A coordinate with a sign or with its letter first, an exponent or a decimal comma."""
     source, span, found = stop.source, stop.span, stop.found
     if found == "-":
         return _signed(source, span)
@@ -137,6 +169,8 @@ def _number(stop: Stop) -> Advice | None:
         start = span.start - len(power[0])
         at = Span(span.file, start, start + len(number)), f"`{number}` is not a number: exponents are not supported"
         return Advice("write all digits, which `_` may group, as in `20_000 m`", at=at)
+    if "<NUMBER>" in stop.symbols and _LETTER_FIRST.fullmatch(found):
+        return Advice(_COORDINATES)
     if found == "," and re.match(r"\d", source.text[span.end :][:1]) and stop.before[-1:].isdigit():
         return Advice("use a decimal point, as in `20.5 m`", Fix(span, ".", "write a point"))
     return None
@@ -274,7 +308,7 @@ def _help(automaton: Automaton, failure: Failure, symbols: set[str]) -> str | No
     if "the" in symbols or symbols == {"last"}:
         return "write a time window as in `for the last 3 s` or `within the last 3 s`"
     if symbols in ({"N", "S"}, {"E", "W"}):
-        return "write latitude and longitude as in `47.3977 N, 8.5456 E`"
+        return _COORDINATES
     if automaton.source.slice(Span(automaton.source.file, failure.start, failure.end)) in words(symbols):
         return "write its arguments in parentheses"
     if symbols >= SHAPE:

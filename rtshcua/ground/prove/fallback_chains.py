@@ -19,6 +19,7 @@ from rtshcua.decision.tree import slots_read
 from rtshcua.decision.values import FALSE, MISSING, TRUE, point
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.substitution import named_at
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.model.flat.contract import Contract, Link, MotionKind, SourceKind
@@ -223,20 +224,19 @@ def prove_landing_height(proof: ProofContext, steps: Sequence[MissionStep]) -> N
         descent = f" to descend from {display(highest, Dimension.ALTITUDE)}, but"
         if 0 < contract.duration_us < needed:
             assert declared.duration is not None
-            message = (
-                f"{needs}{display(-(-needed // _SECOND_US) * _SECOND_US, Dimension.DURATION)}{descent} "
-                f"lasts at most {display(contract.duration_us, Dimension.DURATION)}"
-            )
-            help, written = "raise its `lasts at most`, or fly lower", declared.duration.span
+            enough = display(-(-needed // _SECOND_US) * _SECOND_US, Dimension.DURATION)
+            message = f"{needs}{enough}{descent} lasts at most {display(contract.duration_us, Dimension.DURATION)}"
+            part, written = "lasts at most", declared.duration.span
         elif charge(speeds, needed) > contract.energy:
             assert declared.energy is not None
-            message = (
-                f"{needs}{_percent(-(-charge(speeds, needed) // 10) * 10)} of a full charge{descent} "
-                f"may use at most {_percent(contract.energy)}"
-            )
-            help, written = "raise its `energy at most`, or fly lower", declared.energy.span
+            enough = _percent(-(-charge(speeds, needed) // 10) * 10)
+            message = f"{needs}{enough} of a full charge{descent} may use at most {_percent(contract.energy)}"
+            part, written = "energy at most", declared.energy.span
         else:
             continue
+        size = named_at(proof.report, declared, written)
+        more = f"raise its `{part}`" if size is None else f"write `sizes {contract.name}({size} = {enough})`"
+        help = f"{more}, or fly lower"
         labels = [(written, "declared here"), (proof.span(link), "the last link of a chain")]
         _report_last_link(proof, steps[heights.index(max(heights))].span, message, help, labels)
 

@@ -67,6 +67,27 @@ def test_last_link_must_descend_from_the_highest_step_in_time(seconds: int, expe
     assert codes(down, policy(contingency="return_home, come_down"), flight) == expected
 
 
+@rows(
+    ("size", "part", "help"),
+    [
+        ("", {"lasts": "at most 60 s"}, "raise its `lasts at most`, or fly lower"),
+        ("longest: duration in 10 s .. 3 min = 60 s", {"lasts": "at most longest"},
+         "write `sizes come_down(longest = 68 s)`, or fly lower"),
+        ("most: ratio in 1 % .. 15 % = 1 %", {"lasts": "at most 3 min", "energy": "at most most"},
+         "write `sizes come_down(most = "),
+    ],
+)  # fmt: skip
+def test_last_link_that_cannot_descend_is_told_what_to_set(size: str, part: dict[str, str], help: str) -> None:
+    down = skill(f"come_down() sizes ({size})" if size else "come_down()", **{**LAND, **part})
+    flight = mission("takeoff(altitude = 40 m)", "goto(47.39799 N, 8.54559 E, 60 m)", "return_home()")
+    helps = [
+        each.help or ""
+        for each in findings(program(down, policy(contingency="return_home, come_down"), flight))
+        if each.code.id == "E0618"
+    ]
+    assert [told[: len(help)] for told in helps] == [help]
+
+
 # ---------------------------------------------------------------- E0806, E0807
 
 

@@ -186,7 +186,8 @@ def _restrict(base: ZoneFeature, zone: dict[str, Any], kinds: Any, member: str) 
     try:
         kind = kinds(said).value.replace("AUTHORIZATION", "AUTHORISATION")
     except ValueError:
-        raise UnkeptFeature(f"its `{member}` is not a kind of restriction") from None
+        known = ", ".join(f"`{each.value}`" for each in kinds)
+        raise UnkeptFeature(f"its `{member}` is not a kind of restriction", f"accepted: {known}") from None
     base.use = _USE[kind]
     base.comments = (kind,)
     if kind in _AUTHORISED:
@@ -278,7 +279,8 @@ def _typed(value: Any, kind: Any) -> Any:
     try:
         return ImplicitDict.parse(_plain(_object(value)), kind)
     except (ValueError, TypeError, OverflowError, AttributeError, KeyError) as error:
-        raise UnkeptFeature(f"it is not valid: {' '.join(str(error).split())[:160]}") from None
+        told = " ".join(str(error).split()).partition(" to any of the following formats")[0]
+        raise UnkeptFeature(f"it is not valid: {told[:160]}") from None
 
 
 def _plain(value: Any) -> Any:

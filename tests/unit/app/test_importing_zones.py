@@ -116,6 +116,21 @@ ED269: list[tuple[str, dict[str, Any], list[str]]] = [
 ]  # fmt: skip
 
 
+def test_unknown_restriction_is_told_the_known_ones() -> None:
+    pytest.importorskip("uas_standards", reason="the extra `import` is not installed")
+    (refused,) = found_in(ed269(restriction="MAYBE"), **SITE).not_kept
+    assert refused.help == "accepted: `PROHIBITED`, `REQ_AUTHORISATION`, `CONDITIONAL`, `NO_RESTRICTION`"
+
+
+def test_date_of_no_known_form_is_told_without_a_cut_list_of_forms() -> None:
+    pytest.importorskip("uas_standards", reason="the extra `import` is not installed")
+    changed = {"applicability": [{"permanent": "NO", "startDateTime": "01.06.2026"}]}
+    (refused,) = found_in(ed269(**changed), **SITE).not_kept
+    assert refused.why.startswith("it is not valid: ")
+    assert "01.06.2026" in refused.why
+    assert "YYYY" not in refused.why
+
+
 def test_zones_of_ed269() -> None:
     pytest.importorskip("uas_standards", reason="the extra `import` is not installed")
     wrong = []

@@ -198,6 +198,10 @@ class _Reading:
         """A polygon of the fence, whose positions have the latitude first and are not closed."""
         ring = [_pair(each, f"{place}/{number}") for number, each in enumerate(_array(corners, place))]
         turned = [[longitude, latitude] for latitude, longitude in ring]
+        if len(ring) < 3:
+            help = "draw it again in QGroundControl, with three corners or more"
+            self._not_kept.append(NotKept("fence", place, f"it has {len(ring)} of at least 3 corners", help))
+            return
         try:
             yield QgcFence(place, inclusion, polygon_of([[*turned, *turned[:1]]], place))
         except NoArea as error:

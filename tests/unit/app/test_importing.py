@@ -288,6 +288,13 @@ def test_the_fence_alone_becomes_zones() -> None:
     assert "has no fence" in refused(plan(TAKEOFF), to="zones").text
 
 
+def test_a_fence_without_an_area_is_refused_in_words_of_the_plan() -> None:
+    (unkept,) = imported(plan(TAKEOFF, polygons=[fence(corners=((47.39, 8.54), (47.40, 8.55)))])).not_kept
+    assert (unkept.name, unkept.place) == ("fence", "/geoFence/polygons/0/polygon")
+    assert unkept.why == "it has 2 of at least 3 corners"
+    assert unkept.help == "draw it again in QGroundControl, with three corners or more"
+
+
 def test_a_crossed_fence_is_refused_by_its_place() -> None:
     crossed = fence(corners=((47.39, 8.54), (47.40, 8.55), (47.40, 8.54), (47.39, 8.55)))
     (unkept,) = imported(plan(TAKEOFF, RETURN, polygons=[crossed])).not_kept

@@ -56,6 +56,7 @@ _FOUND: Final = {
     "clock/utc-jump": "time of day and monotonic time diverge by more than their stated errors",
     "close/junk-after": "data follows the signed end of the log: zeros, a newline, or a record",
     "close/missing": "the log ends without its signed close",
+    "image/incomplete": "a step that requires all images succeeded, but its list of them has gaps or is missing",
     "image/malformed": "the record of an image, or of missing images, is malformed",
     "image/missing": "a list of missing images contradicts the recorded images",
     "image/series": "the index of a camera restarted out of turn",

@@ -33,7 +33,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from rtshcua.adapters.gateway.messages import ClientSetup
+from rtshcua.adapters.gateway.messages import ClientSetup, RelayKind, encoded
 from rtshcua.adapters.gateway.process import RelayProcess
 from rtshcua.codec.frames import kind_of
 from rtshcua.ground.gateway.client_frames import made, received
@@ -297,6 +297,7 @@ def _gateway() -> tuple[RelayProcess, list[socket.socket], int]:
     ports, port = [free_port() for _ in range(CLIENTS)], free_port()
     setups = [ClientSetup(f"client {each}", f"udpin:{_HERE}:{each}", rate=1_000) for each in ports]
     process = RelayProcess(f"udpin:{_HERE}:{port}", setups)
+    process.control.send(encoded(RelayKind.VEHICLE, 0, bytes([1])))  # clients hear only a vehicle that is known
     clients = [udp() for _ in ports]
     for client, each in zip(clients, ports, strict=True):
         client.connect((_HERE, each))

@@ -71,21 +71,32 @@ def port_of(address: str) -> int:
     return int(address.rpartition(":")[2])
 
 
+def know(process: RelayProcess) -> None:
+    """The starter of a relay says which system the vehicle is."""
+    process.control.send(encoded(RelayKind.VEHICLE, 0, bytes([1])))
+
+
 class Relayed:
     """A relay with these clients. `vehicle`: the vehicle's socket, to which the relay sends; `flight`: FLIGHT's socket.
 
-    The vehicle was heard, and FLIGHT knows it.
+    The vehicle was heard, and FLIGHT knows it; the starter has said so, unless it is not `known`.
     """
 
-    def __init__(self, clients: Sequence[ClientSetup]) -> None:
+    def __init__(self, clients: Sequence[ClientSetup], *, known: bool = True) -> None:
         self.vehicle = udp()
         self.process = RelayProcess(f"udpout:{HERE}:{self.vehicle.getsockname()[1]}", clients)
         self.flight = self.process.session()
         self.flight.settimeout(PATIENCE_S)
         self.process.control.settimeout(PATIENCE_S)
         self._kept: list[RelayMessage] = []
+        if known:
+            self.know()
         self.flight.send(beat())
         self._at = self.vehicle.recvfrom(4_096)[1]
+
+    def know(self) -> None:
+        """The starter says which system the vehicle is."""
+        know(self.process)
 
     def says(self, *frames: bytes) -> None:
         """The vehicle sends these frames, each as a datagram."""
@@ -139,7 +150,7 @@ class Relayed:
         self.vehicle.close()
 
 
-def relayed(*clients: ClientSetup) -> Relayed:
+def relayed(*clients: ClientSetup, known: bool = True) -> Relayed:
     """A relay with clients whose addresses end in port 0: each gets a free one."""
     for _ in range(_TRIES):
         placed = [
@@ -149,7 +160,7 @@ def relayed(*clients: ClientSetup) -> Relayed:
             for each in clients
         ]
         with suppress(RelayError):  # another test took the port
-            return Relayed(placed)
+            return Relayed(placed, known=known)
     raise AssertionError("the relay did not begin")
 
 

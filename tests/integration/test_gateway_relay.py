@@ -26,6 +26,7 @@ from hostile.relayed import (
     beat,
     clock,
     free_port,
+    know,
     numbers,
     relayed,
     tcp_client,
@@ -70,8 +71,25 @@ def test_frames_of_the_vehicle_reach_everybody_and_nothing_else_comes(opened: Ca
     assert until(100, gateway.process.telemetry.recv)[-1] == 100
 
 
+def test_a_client_hears_a_vehicle_only_when_the_gateway_knows_it(opened: Callable[..., Any]) -> None:
+    """MAVSDK gives up when its first command is refused, and it sends one as soon as it hears a vehicle."""
+    clients = ClientSetup("a", UDP), ClientSetup("q", UDP, pilot=True)
+    gateway: Relayed = opened(relayed(*clients, known=False))
+    client, pilot = (opened(udp_client(port)) for port in gateway.ports())
+    assert gateway.vehicle.recv(4_096) == beat()  # the pilot's
+    gateway.next(RelayKind.CLIENT)  # so the relay has both
+    gateway.says(clock(1))
+    assert until(1, pilot.recv)[-1] == 1
+    gateway.know()
+    gateway.answer(EVERY_CLIENT, beat())
+    assert client.recv(4_096) == beat(), "the starter's word was read before"
+    gateway.says(clock(2))
+    assert until(2, client.recv)[0] == 2, "and the frame before it was not passed on"
+
+
 def test_only_a_session_and_a_pilot_reach_the_vehicle(opened: Callable[..., Any]) -> None:
-    gateway: Relayed = opened(relayed(ClientSetup("a", UDP), ClientSetup("q", UDP, pilot=True)))
+    clients = ClientSetup("a", UDP), ClientSetup("q", UDP, pilot=True)
+    gateway: Relayed = opened(relayed(*clients, known=False))
     one, two = gateway.ports()
     client, pilot = opened(udp_client(one)), opened(udp_client(two))
     assert gateway.vehicle.recv(4_096) == beat()  # the pilot's
@@ -90,7 +108,7 @@ def test_only_a_session_and_a_pilot_reach_the_vehicle(opened: Callable[..., Any]
     assert gateway.vehicle.recv(4_096) == arming(3) + arming(4), "the gateway answers requests for control"
     message = gateway.next(RelayKind.PILOT, lambda each: each.payload not in (beat(), arming(1)))
     assert message.payload == asked
-    gateway.process.control.send(encoded(RelayKind.VEHICLE, 0, bytes([1])))
+    gateway.know()
     gateway.process.control.send(encoded(RelayKind.ANSWER, message.client, beat()))
     assert pilot.recv(4_096) == beat(), "it has read both"
     asks = mavlink.MAVLink_command_long_message(2, 1, 32_100, 0, 1, 0, 0, 0, 0, 0, 0)
@@ -222,6 +240,7 @@ def test_serial_client_and_serial_vehicle(opened: Callable[..., Any]) -> None:
     process: RelayProcess = opened(
         RelayProcess(f"serial:{names[0]}:115200", [ClientSetup("a", f"serial:{names[1]}:115200")])
     )
+    know(process)
     flight = opened(process.session())
     flight.send(beat())
     assert os.read(vehicle, 4_096) == beat()  # so the relay has the session

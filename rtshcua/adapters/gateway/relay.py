@@ -248,7 +248,8 @@ class Relay:
             for datagram in every:
                 pilot.send(datagram)
         theirs = every if DIALOGUES.isdisjoint(numbers) else parcels(_without(batch, DIALOGUES))
-        for peer in self._ordinary:
+        # clients hear a vehicle as soon as their commands for it are decided: some give up at the first refusal
+        for peer in self._ordinary if self._system else ():
             gets_all = peer.withheld.isdisjoint(numbers)  # else less of the autopilot; others have the same messages
             for datagram in theirs if gets_all else _without(theirs, peer.withheld, self._autopilot):
                 peer.send(datagram)

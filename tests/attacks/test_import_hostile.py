@@ -110,6 +110,7 @@ def read_whole(table: StepTable, data: bytes) -> None:
         draft_policy(covered_plan(found, surveys), home, SourceNames(), surveys)
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(st.sampled_from(PATHS), st.sampled_from(VALUES), st.sampled_from(PATHS), st.sampled_from(VALUES))
 def test_a_plan_with_other_values_is_read_or_refused(
@@ -293,6 +294,7 @@ ZONE_FILES = {
 CHANGES = [(name, path) for name, value in ZONE_FILES.items() for path in nodes(value)]
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(st.sampled_from(CHANGES), st.sampled_from((*VALUES, "Polygon", "Point", "AGL", "M", "NaN", "2026-01-01T00:00Z")))
 def test_zones_with_other_values_are_read_or_refused(change: tuple[str, tuple[Any, ...]], value: Any) -> None:

@@ -378,7 +378,7 @@ def refusals(link: socket.socket, request: Callable[[int], tuple[int, bytes]]) -
                 break
         assert time.monotonic() < until, "the gateway does not refuse"
         time.sleep(0.5)
-    time.sleep(2.0)
+    time.sleep(2.0)  # what belongs to the beginning of the session is over
     took = []
     for each in range(REFUSALS):
         time.sleep(PACE_S)

@@ -65,6 +65,11 @@ _WIDTH: Final = re.compile(r"([1-9][0-9]{0,4}(?:\.[0-9]{1,3})?)(?: ?m)?")
 _MOST_PLACES, _MOST_TOLD = 3, 20
 
 
+#: options that apply to areas alone, and to missions alone, by their fields
+_OF_AREAS: Final = {"use": "--as", "terrain": "--terrain", "clock": "--clock", "width": "--width"}
+_OF_MISSIONS: Final = {"policy": "--policy", "proposer": "--proposer", "legs": "--legs"}
+
+
 class ImportRequest(NamedTuple):
     """A file, what is made of it (empty: what its kind usually is), the source to write (None: none), the source with
     the policy of a mission, what is left out, and who proposes a mission. Of zones: what plain areas are for, the
@@ -191,6 +196,9 @@ def _by_kind(request: ImportRequest, terms: ZoneTerms, data: bytes) -> ImportedS
         return _imported_plan(request, read_plan_file(data))
     if request.to == MISSION:
         return _unread(request, "only a plan becomes a mission", "`--to zones` imports areas")
+    unused = _unused(request, _OF_MISSIONS, "the mission of a plan")
+    if unused is not None:
+        return unused
     if kind is ARCHIVE or (kind is None and suffix == ".kmz"):
         data, kind = kml_of(data), KML
     if kind is KML or (kind is None and suffix == ".kml"):
@@ -250,6 +258,14 @@ def _unfit(request: ImportRequest) -> Refusal | None:
     return None
 
 
+def _unused(request: ImportRequest, options: Mapping[str, str], what: str) -> Refusal | None:
+    """Why an option is refused that a file of this kind has no use for: its user would believe that it was followed."""
+    for field, option in options.items():
+        if getattr(request, field) != ImportRequest._field_defaults[field]:
+            return Refusal("usage", f"`{option}` applies to {what} alone", f"leave out `{option}`")
+    return None
+
+
 def _unread(request: ImportRequest, text: str, help: str = "") -> Refusal:
     return Refusal("not-imported", f"`{request.file}`: {text}", help, ExitCode.INPUT)
 
@@ -289,6 +305,11 @@ def _check(request: ImportRequest, text: str) -> _Checked:
 
 def _imported_plan(request: ImportRequest, plan: QgcPlan) -> ImportedSource | Refusal:
     to = request.to or (MISSION if plan.items or plan.not_kept else ZONES)
+    unused = _unused(request, _OF_AREAS, "areas of KML, GeoJSON and zone formats")
+    if unused is None and to == ZONES:
+        unused = _unused(request, _OF_MISSIONS, "the mission of a plan")
+    if unused is not None:
+        return unused
     made = _plan_zones(request, plan) if to == ZONES else _plan_mission(request, plan)
     return _finished(request, "plan", to, made)
 

@@ -132,7 +132,7 @@ def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iter
 
 def _plan(zone: Zone) -> Any:
     """The ground plan of a zone in shapely."""
-    import shapely  # noqa: PLC0415
+    import shapely  # noqa: PLC0415  it is slow to import
 
     if zone.shape == CIRCLE:
         x, y, square = zone.data
@@ -167,7 +167,7 @@ def _edges(zone: Zone, margin_mm: int) -> list[tuple[float, float, float, float,
     """The edges of a zone's ground plan without a margin: where each begins, how far it leads east and north, and the
     square of its length.
     """
-    import shapely  # noqa: PLC0415
+    import shapely  # noqa: PLC0415  it is slow to import
 
     edges = []
     for part in shapely.get_parts(_plan(zone).buffer(-margin_mm)):

@@ -32,6 +32,7 @@ from rtshcua.ground.exchange.plan_steps import ImportedSteps, StepTable, plan_st
 from rtshcua.ground.exchange.qgc_reading import read_plan_file
 from rtshcua.ground.exchange.zone_source import SourceNames
 from rtshcua.ground.format.format_text import format_text
+from virtual.rows import rows
 
 POLICY = Path(__file__).resolve().parents[3] / "policies/bridge_inspection.rts"
 TO = (at(16, 2, 1, 20), at(16, 3, 1, 25))
@@ -67,6 +68,30 @@ def lost(found: ImportedSource) -> dict[str, list[str]]:
     for each in found.losses:
         places.setdefault(each.name, []).append(each.place)
     return places
+
+
+@rows(
+    ("request", "option"),
+    [
+        ({"terrain": "400..460"}, "--terrain"),
+        ({"use": "inside"}, "--as"),
+        ({"clock": "+02:00"}, "--clock"),
+        ({"width": "20"}, "--width"),
+        ({"to": "zones", "legs": True}, "--legs"),
+        ({"to": "zones", "proposer": "agent"}, "--proposer"),
+        ({"to": "zones", "policy": POLICY}, "--policy"),
+    ],
+)
+def test_an_option_without_a_use_is_refused(request: dict[str, Any], option: str) -> None:
+    told = refused(plan(TAKEOFF, *TO, RETURN, polygons=[fence()]), **request)
+    assert (told.slug, told.text.split("`")[1], told.help) == ("usage", option, f"leave out `{option}`")
+
+
+def test_areas_have_no_policy() -> None:
+    Path("a.kml").write_text("<kml/>")
+    told = import_file(ImportRequest(Path("a.kml"), policy=POLICY))
+    assert isinstance(told, Refusal)
+    assert told.text == "`--policy` applies to the mission of a plan alone"
 
 
 def test_a_plan_becomes_a_mission_that_the_checker_accepts() -> None:

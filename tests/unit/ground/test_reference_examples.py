@@ -1,17 +1,23 @@
-"""Every example of docs/language.md and docs/survey.md is compiled, and nothing is found in it."""
+"""Every example of these pages is compiled, and nothing is found in it."""
 
 import re
 from pathlib import Path
 
+import pytest
+
+from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.render import render
+from rtshcua.front.cli.app import main
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[3]
-PAGE, SURVEY = ((CHECKOUT / "docs" / name).read_text(encoding="utf-8") for name in ("language.md", "survey.md"))
-SOURCES = re.findall(r"^```rts\n(.*?)^```$", PAGE + SURVEY, re.DOTALL | re.MULTILINE)
+PAGE, SURVEY, PAYLOAD = (
+    (CHECKOUT / "docs" / name).read_text(encoding="utf-8") for name in ("language.md", "survey.md", "flying/payload.md")
+)
+SOURCES = re.findall(r"^```rts\n(.*?)^```$", PAGE + SURVEY + PAYLOAD, re.DOTALL | re.MULTILINE)
 CONDITIONS = [
     line
     for block in re.findall(r"^```condition\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
@@ -73,3 +79,11 @@ def test_a_source_is_compiled_without_a_finding(source: str) -> None:
 @rows("condition", CONDITIONS)
 def test_a_condition_is_compiled_without_a_finding(condition: str) -> None:
     assert findings(AROUND.replace("CONDITION", condition)) == ""
+
+
+def test_a_policy_forbids_what_a_skill_is_told_to_look_at(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The tests of the example are its claims."""
+    (source,) = re.findall(r"^```rts\n(.*?)^```$", PAYLOAD, re.DOTALL | re.MULTILINE)
+    (tmp_path / "privacy.rts").write_text(source, encoding="utf-8")
+    assert main(["test", str(tmp_path / "privacy.rts")]) == ExitCode.OK
+    assert "3 tests, 5 cases: all passed" in capsys.readouterr().out

@@ -71,11 +71,11 @@ class FlightExport(NamedTuple):
 
     def description(self, *more: str) -> tuple[str, ...]:
         """What the file is made from, line by line; `more` is about its format."""
-        policy = self.flight.policy
+        policy, intent = self.flight.policy, self.flight.mission.intent
         return (
             f"mission {self.title} under {shown(policy.name)}@{policy.version},"
             f" begun {utc_text(self.flight.genesis.utc_us)}",
-            f"intent: {shown(self.flight.mission.intent)}",
+            *([f"intent: {shown(intent)}"] if intent else []),
             *more,
             f"log: {shown(self.log_status)}; an export is never a record, only the log is evidence",
             f"made by {self.made_by}",

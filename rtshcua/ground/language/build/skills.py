@@ -311,8 +311,11 @@ def pictures(reader: Reader, span: Span, camera: Name, *shown: Any) -> Part:
     """`pictures by mapper every 10 m resolution finest overlap 80 % forward 70 % side`."""
     reader.undotted(camera, "camera")
     written = dict(zip(_SHOWN, shown, strict=True))
-    sized = [Sized(span=each.span, part=name, size=each) for name, each in written.items()  # type: ignore[arg-type]
-             if isinstance(each, Reference)]  # fmt: skip
+    sized = [
+        Sized(span=each.span, part=name, size=each)  # type: ignore[arg-type]  # `zip` loses which texts these are
+        for name, each in written.items()
+        if isinstance(each, Reference)
+    ]
     plain = {name: None if isinstance(each, Reference) else each for name, each in written.items()}
     return Part("pictures", span, (PicturesDecl(span=span, camera=camera, **plain), tuple(sized)))
 

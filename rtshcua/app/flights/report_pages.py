@@ -62,9 +62,13 @@ def target_of(output: Path, logs: Sequence[Path], *, redacted: bool) -> Path | R
 def flight_page(
     request: FlightReportRequest, file: Path | None, tiles: str, progress: Progress = lambda _: None
 ) -> FlightPage | Refusal:
-    """Make the page of a flight and write it. Raises OSError."""
+    """Make the page of a flight, the last thing that a process does, and write it. Raises OSError."""
     found = flight_report(request, progress)
-    return found if isinstance(found, Refusal) else _written(found, file, tiles)
+    if isinstance(found, Refusal):
+        return found
+    made = _written(found, file, tiles)
+    gc.freeze()  # the search for cycles at the end of the process would find nothing to free
+    return made
 
 
 class Logbook:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from struct import pack, unpack
@@ -109,6 +110,29 @@ def test_nothing_is_answered_after_a_violation(world: SecureWorld, attack: Attac
     assert world.call(bytes([DIGEST]))[:1] == b"\0"
     assert attack(READ, [KEYS[1]]) == [NOTICED]
     assert world.call(bytes([DIGEST])) == b""
+
+
+def started_late(folder: Path, monkeypatch: pytest.MonkeyPatch, *on_time: bool) -> SecureWorld:
+    """A world of which one start after the other was on time or not."""
+    starts = iter(on_time)
+    monkeypatch.setattr(SecureWorld, "_is_on_time", lambda _: next(starts))
+    return SecureWorld(SIGNED_ROOT, PIN, VEHICLE, folder, own_seed=OWN_KEY, log_seed=LOG_KEY)
+
+
+def test_a_world_whose_clock_lags_is_started_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with closing(started_late(tmp_path, monkeypatch, False, True)) as home:
+        assert home.call(bytes([DIGEST]))[:1] == b"\0"
+        assert home.violations() == 0
+
+
+def test_a_world_whose_clock_always_lags_does_not_begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = sorted(Path("/proc/self/fd").iterdir())
+    with pytest.raises(BoundaryError, match="took too long to start, 3 times") as found:
+        started_late(tmp_path, monkeypatch, False, False, False)
+    assert found.value.slug == "not-begun"
+    assert sorted(Path("/proc/self/fd").iterdir()) == files
+    with closing(started_late(tmp_path, monkeypatch, True)) as home:
+        assert home.call(bytes([DIGEST]))[:1] == b"\0"
 
 
 def test_a_setup_is_gone_once_it_was_read(tmp_path: Path, attack: Attack, world: SecureWorld) -> None:

@@ -87,6 +87,8 @@ class EmulatedHome(BoundaryHome):
 
     def _launch(self, words: Sequence[str], files: Sequence[int], help: str) -> None:
         """Start the emulator, which gets these files."""
+        if self._errors >= 0:
+            os.close(self._errors)
         self._errors = os.memfd_create("errors")
         try:
             self._process = subprocess.Popen(

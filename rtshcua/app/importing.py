@@ -57,7 +57,9 @@ _EXTRA: Final = ("uas_standards", "implicitdict")
 _OF_CHARGE: Final = frozenset({"E0614", "E0620", "E0804", "E0809", "E0812", "E0814", "E0815"})
 #: the name of a source that is not written to a file
 _UNNAMED: Final = "imported.rts"
-SUFFIXES: Final = (".plan", ".kml", ".kmz", ".geojson", ".json")
+#: the kind of a file that does not show it by its first bytes
+_BY_SUFFIX: Final = {".plan": PLAN, ".kml": KML, ".kmz": ARCHIVE, ".geojson": GEOJSON, ".json": GEOJSON}
+SUFFIXES: Final = tuple(_BY_SUFFIX)
 _TERRAIN: Final = re.compile(r"(-?[0-9]{1,4}(?:\.[0-9]{1,3})?)\.\.(-?[0-9]{1,4}(?:\.[0-9]{1,3})?)")
 _CLOCK: Final = re.compile(r"utc|(?:utc ?)?([+-])([01]?[0-9]):([0-5][0-9])")
 _WIDTH: Final = re.compile(r"([1-9][0-9]{0,4}(?:\.[0-9]{1,3})?)(?: ?m)?")
@@ -191,20 +193,20 @@ def import_file(request: ImportRequest) -> ImportedSource | Refusal:
 
 def _by_kind(request: ImportRequest, terms: ZoneTerms, data: bytes) -> ImportedSource | Refusal:
     """Import a file of any kind. Raises `NotReadable`."""
-    kind, suffix = recognised(data), request.file.suffix.lower()
-    if kind is PLAN or (kind is None and suffix == ".plan"):
+    kind = recognised(data) or _BY_SUFFIX.get(request.file.suffix.lower())
+    if kind is PLAN:
         return _imported_plan(request, read_plan_file(data))
     if request.to == MISSION:
         return _unread(request, "only a plan becomes a mission", "`--to zones` imports areas")
     unused = _unused(request, _OF_MISSIONS, "the mission of a plan")
     if unused is not None:
         return unused
-    if kind is ARCHIVE or (kind is None and suffix == ".kmz"):
+    if kind is ARCHIVE:
         data, kind = kml_of(data), KML
-    if kind is KML or (kind is None and suffix == ".kml"):
+    if kind is KML:
         found = zones_of_kml(read_kml(data), terms.width, request.use)
         return _imported_zones(request, terms, "kml", found.features, found.losses, found.not_kept)
-    if kind in (GEOJSON, ED269) or (kind is None and suffix in (".json", ".geojson")):
+    if kind in (GEOJSON, ED269):
         return _imported_json(request, terms, data)
     name = "no file that can be imported" if kind is None else kind.name
     return _unread(request, f"it is {name}", f"imported are {listed(SUFFIXES)}")

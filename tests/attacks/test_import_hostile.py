@@ -122,7 +122,7 @@ def test_a_plan_with_other_values_is_read_or_refused(
         try:
             for key in path[:-1]:
                 place = place[key]
-            place[path[-1]] = new
+            place[path[-1]] = copy.deepcopy(new)  # the other change may be within it
         except (KeyError, IndexError, TypeError):
             pass  # the other change removed it
     read_whole(table, json.dumps(tree).encode())

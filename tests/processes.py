@@ -1,7 +1,8 @@
 """`pytest -n N`: run the tests in N processes, forked after import and collection.
 
 Import and collection take longer than the tests of any file, so they are done once. One process runs a whole file, so
-that its shared fixtures are made once, and then requests the next file.
+that its shared fixtures are made once, and then requests the next file; tests that are marked `long` are handed out one
+by one, and first.
 """
 
 import gc
@@ -11,12 +12,13 @@ import sys
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from tempfile import TemporaryFile
 from types import SimpleNamespace
 from typing import Any
@@ -79,11 +81,7 @@ class Processes:
             session.testsfailed and not session.config.option.continue_on_collection_errors
         ):
             return None
-        files = [[at for at, _ in group] for _, group in groupby(enumerate(session.items), lambda each: each[1].path)]
-        # flights in real time come last: two of three processes start at that end, see `next_file`; many small files
-        # come
-        # before them, so that all processes end at about the same time
-        files.sort(key=lambda each: [name in session.items[each[0]].path.parts for name in ("integration", "unit")])
+        files = in_order(session.items)
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  one folder for all processes
         try:
             for _ in range(min(self._number, len(files))):
@@ -194,6 +192,25 @@ class Processes:
         report = pytest.TestReport(item.nodeid, item.location, {}, "failed", why, "call")
         report.node = worker.node  # type: ignore[attr-defined]
         session.config.hook.pytest_runtest_logreport(report=report)
+
+
+def in_order(items: Sequence[pytest.Item]) -> list[list[int]]:
+    """Return the numbers of the tests of each file; a long test is by itself.
+
+    Long tests and flights in real time come last: two of three processes start at that end, see `next_file`. Many small
+    files come before them, so that all processes end at about the same time.
+    """
+
+    def apart(each: tuple[int, pytest.Item]) -> tuple[Path, int | None]:
+        at, item = each
+        return item.path, at if item.get_closest_marker("long") else None
+
+    def order(file: list[int]) -> tuple[bool, ...]:
+        item = items[file[0]]
+        folders = item.path.parts
+        return item.get_closest_marker("long") is not None, "integration" in folders, "unit" in folders
+
+    return sorted(([at for at, _ in group] for _, group in groupby(enumerate(items), apart)), key=order)
 
 
 def computes(number: int) -> bool:

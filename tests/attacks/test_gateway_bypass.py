@@ -27,7 +27,7 @@ from rtshcua.mavlink.modes import CopterMode, Px4Mode
 from rtshcua.mavlink.signing import EPOCH_US, MINUTE, SignedLink, SigningState, timestamp_in
 from virtual.gateway_run import NAN, GatewayRun, ScriptClient, free_port, running, taken_off, verified
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 KEY: Final = b"the key of the link, 32 octets.."
 OTHER_KEY: Final = bytes(range(32))

@@ -89,8 +89,14 @@ class Run:
         return [record["event"] for record in self.log() if record["type"] == "effect"]
 
     def dispatched(self) -> list[str]:
-        """The skills that were dispatched, in order."""
-        return [r["detail"] for r in self.log() if r["type"] == "effect" and r["event"] == "dispatched"]
+        """The skills of which a command was sent, in order: a busy machine may miss a permit's time, and ask again."""
+        sent: list[str] = []
+        for record in self.log():
+            if record["type"] == "effect" and record["event"] == "dispatched":
+                sent.append(record["detail"])
+            elif record["type"] == "effect" and record["detail"] == "permit/unsent":
+                sent.pop()
+        return sent
 
     def _read(self) -> bool:
         out = self.process.stdout

@@ -44,12 +44,14 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return script
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("requests", [1_000, pytest.param(5_000, marks=pytest.mark.soak)])
 def test_aarch64_boundary_answers_as_the_native_one(
-    program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    requests: int, program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(boundary_process, "program", lambda: program)
-    counts = ask_both(7, 5_000, tmp_path)
-    assert decided(counts) >= 5_000
+    counts = ask_both(7, requests, tmp_path)
+    assert decided(counts) >= requests
     assert min(counts[each] for each in ("dispatches", "frames", "documents accepted", "statements")) > 0, counts
 
 

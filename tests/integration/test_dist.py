@@ -58,6 +58,7 @@ VENDORED = {"@noble/ed25519"}
 
 
 @pytest.mark.clients
+@pytest.mark.long
 @pytest.mark.parametrize("anew", [False, pytest.param(True, marks=pytest.mark.soak)])
 def test_make_dist_is_reproducible(tmp_path: Path, anew: bool) -> None:
     """`anew`: the other compiles the C library too."""

@@ -14,13 +14,14 @@ from rtshcua.virtual.fitting import with_room
 from virtual import case
 from virtual.flight import Flight
 
-#: flown by `make test`, the others by `make slow`
+#: flown by `make test`; every fifth of the others by `make slow`, all by `make soak`
 SAMPLE = (
     (EvaluationPoint("short", 100_000), AutopilotKind.PX4),
     (EvaluationPoint("short", 1_500_000), AutopilotKind.ARDUPILOT),
 )
 FLIGHTS = [
-    pytest.param(*each, marks=() if each in SAMPLE else pytest.mark.slow) for each in product(POINTS, AutopilotKind)
+    pytest.param(*each, marks=() if each in SAMPLE else pytest.mark.slow if number % 5 == 0 else pytest.mark.soak)
+    for number, each in enumerate(product(POINTS, AutopilotKind))
 ]
 
 

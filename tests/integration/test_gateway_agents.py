@@ -13,7 +13,7 @@ import pytest
 from virtual.gateway_clients import INSIDE, OTHERS, PROGRAMS, REASONS, Side, carried_out, flown, gateway, reads
 from virtual.gateway_run import ScriptClient, mavlink
 
-pytestmark = pytest.mark.clients
+pytestmark = [pytest.mark.clients, pytest.mark.long]
 
 
 def mcp(side: Side, role: str, server: str, *actions: Sequence[object]) -> list[str]:

@@ -13,7 +13,7 @@ import pytest
 
 from virtual.gateway_clients import INSIDE, OTHERS, OUTSIDE, PROGRAMS, REASONS, carried_out, flown, gateway, reads
 
-pytestmark = pytest.mark.clients
+pytestmark = [pytest.mark.clients, pytest.mark.long]
 
 
 class Client(NamedTuple):

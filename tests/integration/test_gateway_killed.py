@@ -10,7 +10,7 @@ import pytest
 from rtshcua.adapters.simulator import Simulator
 from virtual.gateway_run import KML, PATIENCE_S, GatewayRun, ScriptClient, free_port, running, taken_off, verified
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 
 def test_a_killed_flight_is_brought_down_by_the_next_one(tmp_path: Path) -> None:

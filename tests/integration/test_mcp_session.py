@@ -328,6 +328,7 @@ def test_key_without_a_trust_root_is_refused(ground: Any, base: str, place: Path
 
 
 @pytest.mark.clients
+@pytest.mark.long
 def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path) -> None:
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
@@ -389,6 +390,7 @@ def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path) -> No
 
 
 @pytest.mark.clients
+@pytest.mark.long
 def test_agents_cancellation_flies_the_contingency(ground: Any, base: str, place: Path) -> None:
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
@@ -518,6 +520,7 @@ def test_token_readable_by_others_is_refused(ground: Any, base: str, place: Path
 
 
 @pytest.mark.clients
+@pytest.mark.long
 def test_flight_ends_without_a_dead_host(ground: Any, base: str, place: Path) -> None:
     """It calls a hundred tools at once, breaks off in the middle, and nobody follows the flight any more."""
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
@@ -549,6 +552,7 @@ def test_flight_ends_without_a_dead_host(ground: Any, base: str, place: Path) ->
 
 
 @pytest.mark.clients
+@pytest.mark.long
 def test_scripted_host_flies_with_the_plug_in(ground: Any, base: str, place: Path) -> None:
     """As the README has it, without a model."""
     made = ground.start("agent-bundle", "plug", "--bundle", base, "--to", str(place), "--with", str(POLICY)).process

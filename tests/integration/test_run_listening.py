@@ -62,6 +62,7 @@ def made() -> Iterator[Listening]:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_run_without_keys_flies_by_a_listening_boundary(ground: Any, made: Listening, port: int) -> None:
     aboard = Aboard(ground, made, port, signed=True)
     run = aboard.run()
@@ -81,6 +82,7 @@ def test_run_without_keys_flies_by_a_listening_boundary(ground: Any, made: Liste
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_vehicle_of_a_killed_runtime_is_brought_down(ground: Any, made: Listening, port: int) -> None:
     """The boundary is gone at once, and the next run brings the vehicle down. The log that broke off stays open: its
     key is not here.
@@ -110,6 +112,7 @@ def test_vehicle_of_a_killed_runtime_is_brought_down(ground: Any, made: Listenin
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_broken_off_flight_lands_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
     """Nobody can verify that log, for the log's key is drawn; nothing new flies."""
     aboard = Aboard(ground, made, port, signed=False)
@@ -130,6 +133,7 @@ def test_broken_off_flight_lands_without_the_boundary(ground: Any, made: Listeni
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_signing_vehicle_is_not_awaited_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
     """Nothing that this run could send is obeyed: it ends, and one that is begun once the boundary is there does it."""
     aboard = Aboard(ground, made, port, signed=True, speed=1)  # who cannot ask it does not know that it is simulated
@@ -148,6 +152,7 @@ def test_signing_vehicle_is_not_awaited_without_the_boundary(ground: Any, made: 
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_boundary_killed_in_flight_is_survived(ground: Any, made: Listening, port: int) -> None:
     """What it signed ahead brings the vehicle down, which enforces signing."""
     aboard = Aboard(ground, made, port, signed=True)
@@ -175,6 +180,7 @@ def away(folder: Path) -> Iterator[None]:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_waiting_run_flies_and_recovers(ground: Any, made: Listening, port: int) -> None:
     """As the unit has it, with no key store at all: what is handed in flies; one that is killed is begun again, and
     brings the vehicle down.

@@ -16,7 +16,7 @@ from integration.test_run_process import heights, link_key
 from rtshcua.adapters.boundary.trustzone_m import EMULATOR
 from virtual.sampling import each_once
 
-pytestmark = [needs_emulator, pytest.mark.clients]
+pytestmark = [needs_emulator, pytest.mark.clients, pytest.mark.long]
 
 SPEED = 3
 CHECKOUT = Path(__file__).resolve().parents[2]

@@ -5,10 +5,11 @@ import subprocess
 import sys
 from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from processes import Worker, next_file
+from processes import Worker, in_order, next_file
 
 CONFTEST = """
 import os
@@ -142,6 +143,19 @@ def test_last_files_start_first_in_other_processes() -> None:
     with own, other:
         given = [next_file(Worker(number, 0, own), files) for number in (0, 1, 2, 3, 4, 5)]
     assert given == [[0, 1], [6], [5], [2], [3, 4], []]
+
+
+def test_long_tests_are_given_one_by_one_at_the_end_where_flights_begin() -> None:
+    def item(path: str, long: bool) -> SimpleNamespace:
+        return SimpleNamespace(path=Path(path), get_closest_marker=lambda _: long or None)
+
+    named = [
+        ("attacks/test_a.py", True), ("attacks/test_a.py", True), ("attacks/test_a.py", False),
+        ("attacks/test_a.py", False), ("integration/test_b.py", False), ("model/test_c.py", False),
+        ("unit/test_d.py", False), ("unit/test_d.py", True),
+    ]  # fmt: skip
+    items = [item(*each) for each in named]
+    assert in_order(items) == [[2, 3], [5], [6], [4], [0], [1], [7]]  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from mcp import ClientSession, StdioServerParameters
-from mcp.client.stdio import stdio_client
+from mcp import Client, StdioServerParameters
+from mcp_types import ElicitRequestParams, ElicitResult
 
 #: how long a vehicle is waited for until it is ready, in tries of half a second
 TRIES = 240
@@ -25,12 +25,18 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-async def asked(session: ClientSession, tool: str, **arguments: Any) -> dict[str, Any]:
+async def asked(session: Client, tool: str, **arguments: Any) -> dict[str, Any]:
     """What a tool answers."""
-    return (await session.call_tool(tool, arguments)).structuredContent or {}
+    return (await session.call_tool(tool, arguments)).structured_content or {}
 
 
-async def fly(session: ClientSession, mission: Any) -> int:
+async def shown(_: Any, question: ElicitRequestParams) -> ElicitResult:
+    """Show its person a question of the server: what is answered here is no approval."""
+    say(question.message)
+    return ElicitResult(action="accept", content={})
+
+
+async def fly(session: Client, mission: Any) -> int:
     """Propose a mission once the vehicle is ready, and follow it to its end."""
     for _ in range(TRIES):
         vehicle = await asked(session, "describe_vehicle")
@@ -48,9 +54,7 @@ async def fly(session: ClientSession, mission: Any) -> int:
     told = proposed
     while not told.get("over"):
         told = await asked(session, "mission_status", ticket=proposed["ticket"], wait_s=20)
-        say(f"{told['state']}, {told['stage']}: {json.dumps(told['decision'])}")
-        if told["approval"]:
-            say(f"somebody has to agree: {told['approval']['how']}")
+        say(f"{told['state']}, {told['stage']}, {told.get('step', 'no step')}: {', '.join(told.get('changed', ()))}")
     say(f"it ended as {told['ending']}")
     return 0 if told["ending"] == "completed" else 1
 
@@ -59,8 +63,7 @@ async def main(plugin: str, mission: str) -> int:
     """Start the server that the plug-in names."""
     (server,) = json.loads((Path(plugin) / ".mcp.json").read_text("utf-8"))["mcpServers"].values()
     proposal = json.loads(Path(mission).read_text("utf-8"))
-    async with stdio_client(StdioServerParameters(**server)) as (read, write), ClientSession(read, write) as session:
-        await session.initialize()
+    async with Client(StdioServerParameters(**server), elicitation_callback=shown) as session:
         return await fly(session, proposal)
 
 

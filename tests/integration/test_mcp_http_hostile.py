@@ -483,3 +483,97 @@ def test_number_of_sessions_is_limited(served: Served) -> None:
         assert served.left(session) == 200
     session = served.greeted()
     assert served.left(session) == 200
+
+
+# ------------------------------------------------------------------------------------------ without sessions
+
+VERSION = "2026-07-28"
+META = {
+    "io.modelcontextprotocol/protocolVersion": VERSION, "io.modelcontextprotocol/clientCapabilities": {},
+}  # fmt: skip
+NAMED = {"Mcp_Protocol_Version": VERSION, "Mcp_Method": "tools/list"}
+
+
+def stateless(method: str = "tools/list", number: Any = 5, **params: Any) -> dict[str, Any]:
+    return {"jsonrpc": "2.0", "id": number, "method": method, "params": {"_meta": META} | params}
+
+
+def test_stateless_request_needs_all_that_others_need(served: Served) -> None:
+    status, headers, body = served.ask(stateless(), **NAMED)
+    assert (status, json.loads(body)["id"]) == (200, 5)
+    assert SESSION.lower() not in headers
+    assert served.status(stateless(), **NAMED, Authorization="Bearer x") == 401
+    assert served.status(stateless(), **NAMED, Origin="https://evil.example") == 403
+    assert served.status(stateless(), **NAMED, Host="evil.example") == 421
+    assert served.status(stateless(), **NAMED, Content_Type="text/plain") in (400, 415)
+    assert served.status([stateless(), stateless()], **NAMED) == 400
+    for method in ("GET", "DELETE"):
+        assert served.status(method=method, **NAMED) in (400, 404, 405)
+    assert served.status(stateless("tools/destroy"), **NAMED | {"Mcp_Method": "tools/destroy"}) == 404
+    for session in ("0" * 32, "../x"):
+        assert served.status(stateless(), **NAMED, Mcp_Session_Id=session) in (200, 400, 404)
+
+
+CANCELS = stateless("tools/call", name="cancel", arguments={})
+
+
+@pytest.mark.parametrize(
+    ("message", "headers"),
+    [
+        (stateless(), {"Mcp_Method": "tools/call"}),
+        (stateless(), {"Mcp_Protocol_Version": "2026-07-29"}),
+        (stateless(), {"Mcp_Protocol_Version": "x" * 5_000}),
+        (CANCELS, {"Mcp_Method": "tools/call", "Mcp_Name": "describe_policy"}),
+        (CANCELS, {"Mcp_Method": "tools/call"}),
+        (stateless() | {"params": {}}, {}),
+        (stateless() | {"params": {"_meta": META | {"io.modelcontextprotocol/protocolVersion": 7}}}, {}),
+        (stateless() | {"params": {"_meta": [META]}}, {}),
+        (stateless() | {"method": "initialize"}, {"Mcp_Method": "initialize"}),
+        (stateless() | {"id": 1.5}, {}),
+        (stateless() | {"id": None}, {}),
+    ],
+)  # fmt: skip
+def test_request_that_contradicts_itself_is_refused(served: Served, message: Any, headers: dict[str, str]) -> None:
+    """A proxy that looks at headers and a server that looks at bodies must see the same call."""
+    status, _, body = served.ask(message, **NAMED | headers)
+    assert status in (400, 404)
+    assert "error" in json.loads(body)
+
+
+def test_key_twice_is_refused_whoever_would_win(served: Served) -> None:
+    body = json.dumps(stateless("tools/call", name="describe_policy")).replace('"name"', '"name": "cancel", "name"')
+    status, _, said = served.ask(body.encode(), **NAMED | {"Mcp_Method": "tools/call", "Mcp_Name": "describe_policy"})
+    assert status == 400
+    assert "a key twice" in json.loads(said)["error"]["message"]
+
+
+@pytest.mark.slow
+def test_listeners_are_limited_and_keep_no_other_out(served: Served) -> None:
+    asked = stateless("subscriptions/listen", notifications={"resourceSubscriptions": ["rtshcua://flight"]})
+    body = json.dumps(asked).encode()
+    head = served.head(
+        "POST /mcp HTTP/1.1", served.bearer(), f"Content-Length: {len(body)}", "Content-Type: application/json",
+        "Accept: application/json, text/event-stream", f"Mcp-Protocol-Version: {VERSION}",
+        "Mcp-Method: subscriptions/listen",
+    )  # fmt: skip
+    links = [served.dial() for _ in range(34)]
+    try:
+        answers = []
+        for link in links:
+            link.sendall(head + body)
+            answers.append(first(link))
+        assert sum(b"text/event-stream" in each for each in answers) == 32
+        assert served.status(stateless(), **NAMED) == 200
+    finally:
+        for link in links:
+            link.close()
+    until_s = time.monotonic() + 20
+    while b"text/event-stream" not in again(served, head + body):
+        assert time.monotonic() < until_s, "listeners that have gone make room"
+        time.sleep(0.2)
+
+
+def again(served: Served, data: bytes) -> bytes:
+    with served.dial() as link:
+        link.sendall(data)
+        return first(link)

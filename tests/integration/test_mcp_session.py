@@ -23,9 +23,9 @@ import pytest
 
 pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
 import anyio
-import httpx
-from mcp import ClientSession, McpError, StdioServerParameters, types
-from mcp.client.stdio import stdio_client
+import httpx2
+import mcp_types as types
+from mcp import Client, MCPError, StdioServerParameters
 from mcp.client.streamable_http import streamable_http_client
 
 from rtshcua.wire.request import STEP
@@ -34,6 +34,12 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 POLICY = CHECKOUT / "policies/bridge_inspection.rts"
 PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))
 SPEED = 10
+#: a host of 2025-11-25 subscribes, of which the SDK's client warns
+pytestmark = pytest.mark.filterwarnings(r"ignore:resources/(un)?subscribe is removed")
+#: how a client of the SDK begins: with `initialize`; as a host of today, which asks first; and without asking
+LEGACY, AUTO, STATELESS = "legacy", "auto", "2026-07-28"
+#: the two generations of the protocol
+BOTH = pytest.mark.parametrize("mode", [LEGACY, AUTO])
 
 
 @pytest.fixture
@@ -55,31 +61,32 @@ def base(ground: Any) -> str:
 
 @asynccontextmanager
 async def hosted(
-    ground: Any, base: str, place: Path, *more: str, heard: Callable[[str], None] | None = None
-) -> AsyncIterator[ClientSession]:
+    ground: Any, base: str, place: Path, *more: str, mode: Any = LEGACY, heard: Callable[[str], None] | None = None,
+    **options: Any,
+) -> AsyncIterator[Client]:  # fmt: skip
     words = ["mcp", base, "--to", str(place), "--with", str(POLICY), *more]
     server = StdioServerParameters(
         command=ground.program, args=words, env=dict(ground.environment), cwd=str(ground.folder)
     )
 
     async def message(what: Any) -> None:
-        told = what.root if isinstance(what, types.ServerNotification) else None
-        if heard is not None and isinstance(told, types.ResourceUpdatedNotification):
-            heard(str(told.params.uri))
+        if heard is not None and isinstance(what, types.ResourceUpdatedNotification):
+            heard(str(what.params.uri))
 
-    async with stdio_client(server) as (read, write), ClientSession(read, write, message_handler=message) as session:
+    async with Client(server, mode=mode, message_handler=message, **options) as session:
         yield session
 
 
 def session_of(
-    ground: Any, base: str, place: Path, work: Callable[[ClientSession], Awaitable[None]], *more: str,
-    heard: Callable[[str], None] | None = None,
+    ground: Any, base: str, place: Path, work: Callable[[Client], Awaitable[None]], *more: str, mode: Any = LEGACY,
+    heard: Callable[[str], None] | None = None, **options: Any,
 ) -> None:  # fmt: skip
     async def run() -> None:
-        async with hosted(ground, base, place, *more, heard=heard) as session:
-            told = await session.initialize()
-            assert told.capabilities.resources is not None
-            assert told.capabilities.resources.subscribe
+        async with hosted(ground, base, place, *more, mode=mode, heard=heard, **options) as session:
+            told = session.server_capabilities
+            assert told.resources is not None
+            assert told.resources.subscribe
+            assert session.protocol_version == ("2025-11-25" if mode == LEGACY else STATELESS)
             await work(session)
 
     asyncio.run(asyncio.wait_for(run(), 200))
@@ -87,18 +94,18 @@ def session_of(
 
 async def refused(doing: Awaitable[Any]) -> str:
     """Why the server refuses a request."""
-    with pytest.raises(McpError) as error:
+    with pytest.raises(MCPError) as error:
         await doing
     return str(error.value)
 
 
-async def call(session: ClientSession, name: str, /, **arguments: Any) -> dict[str, Any]:
+async def call(session: Client, name: str, /, **arguments: Any) -> dict[str, Any]:
     found = await session.call_tool(name, arguments)
-    told: dict[str, Any] = found.structuredContent or {"text": found.content[0].text}  # type: ignore[union-attr]
-    return told | {"wrong": found.isError}
+    told: dict[str, Any] = found.structured_content or {"text": found.content[0].text}  # type: ignore[union-attr]
+    return told | {"wrong": found.is_error}
 
 
-async def evidence(session: ClientSession) -> list[dict[str, Any]]:
+async def evidence(session: Client) -> list[dict[str, Any]]:
     """All records of the flight, in their order."""
     found: list[dict[str, Any]] = []
     first: int | None = 0
@@ -109,8 +116,9 @@ async def evidence(session: ClientSession) -> list[dict[str, Any]]:
     return found
 
 
-def test_tools_without_a_vehicle(ground: Any, base: str, place: Path) -> None:
-    async def work(session: ClientSession) -> None:
+@BOTH
+def test_tools_without_a_vehicle(ground: Any, base: str, place: Path, mode: str) -> None:
+    async def work(session: Client) -> None:
         names = {each.name for each in (await session.list_tools()).tools}
         assert names == {
             "describe_vehicle", "describe_policy", "check_mission", "propose_mission", "mission_status",
@@ -122,10 +130,10 @@ def test_tools_without_a_vehicle(ground: Any, base: str, place: Path) -> None:
         assert "From 3 m to 40 m" in policy["skills"]["takeoff"]["arguments"]["altitude"]
         assert (await call(session, "check_mission", mission=PROPOSAL))["accepted"]
         for uri in ("rtshcua://policy", "rtshcua://schema", "rtshcua://log", "rtshcua://flight"):
-            (found,) = (await session.read_resource(uri)).contents  # type: ignore[arg-type]
+            (found,) = (await session.read_resource(uri)).contents
             assert json.loads(found.text)  # type: ignore[union-attr]
-        for uri in ("rtshcua://policy", "rtshcua://keys", "file:///etc/passwd"):
-            assert "does not change" in await refused(session.subscribe_resource(uri))  # type: ignore[arg-type]
+        for uri in ("rtshcua://policy", "rtshcua://keys", "file:///etc/passwd") if mode == LEGACY else ():
+            assert "does not change" in await refused(session.subscribe_resource(uri))
         wrong = deepcopy(PROPOSAL)
         wrong["proposed_by"]["source"] = "operator"
         answer = await call(session, "propose_mission", mission=wrong, idempotency_key="a")
@@ -135,7 +143,7 @@ def test_tools_without_a_vehicle(ground: Any, base: str, place: Path) -> None:
         status = await call(session, "mission_status", ticket=ticket["ticket"], wait_s=20)
         assert (status["state"], status["code"], status["over"]) == ("refused", "unreachable", True)
 
-    session_of(ground, base, place, work)
+    session_of(ground, base, place, work, mode=mode)
 
 
 #: what an agent that means ill, or that was told to, calls; and how it is answered
@@ -227,10 +235,11 @@ REFUSED: tuple[dict[str, Any], ...] = (
 
 
 @pytest.mark.slow
-def test_hostile_tool_calls_are_answered_and_sign_nothing(ground: Any, base: str, place: Path) -> None:
+@BOTH
+def test_hostile_tool_calls_are_answered_and_sign_nothing(ground: Any, base: str, place: Path, mode: str) -> None:
     assert len(HOSTILE) + len(REFUSED) >= 60
 
-    async def work(session: ClientSession) -> None:
+    async def work(session: Client) -> None:
         for name, arguments in HOSTILE:
             told = await call(session, name, **arguments)
             assert told["wrong"] or told.get("accepted") is False, (name, arguments, told)
@@ -242,11 +251,11 @@ def test_hostile_tool_calls_are_answered_and_sign_nothing(ground: Any, base: str
                 assert set(each) == {
                     "code", "field", "message", "limit", "observed", "age_us", "nearest", "repair"
                 }  # fmt: skip
-        with pytest.raises(McpError, match="larger than 4 MiB"):
+        with pytest.raises(MCPError, match="larger than 4 MiB"):
             await call(session, "propose_mission", mission=changed("intent", "x" * 10_000_000), idempotency_key="m")
         assert (await call(session, "describe_policy"))["policy"] == "bridge_inspection@7"
 
-    session_of(ground, base, place, work)
+    session_of(ground, base, place, work, mode=mode)
 
 
 @pytest.mark.slow
@@ -258,15 +267,15 @@ def test_subscriber_is_notified_until_it_unsubscribes(ground: Any, base: str, pl
         while uri not in updated:
             await asyncio.sleep(0.02)
 
-    async def stage(session: ClientSession) -> str:
-        (found,) = (await session.read_resource("rtshcua://flight")).contents  # type: ignore[arg-type]
+    async def stage(session: Client) -> str:
+        (found,) = (await session.read_resource("rtshcua://flight")).contents
         return str(json.loads(found.text)["stage"])  # type: ignore[union-attr]
 
-    async def work(session: ClientSession) -> None:
+    async def work(session: Client) -> None:
         assert await stage(session) == "unreachable"
-        await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
-        await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]  # twice is once
-        await session.subscribe_resource("rtshcua://log")  # type: ignore[arg-type]
+        await session.subscribe_resource("rtshcua://flight")
+        await session.subscribe_resource("rtshcua://flight")  # twice is once
+        await session.subscribe_resource("rtshcua://log")
         peers: list[asyncio.StreamWriter] = []
         door = await asyncio.start_unix_server(lambda _, peer: peers.append(peer), str(place))
         while not peers:
@@ -281,7 +290,7 @@ def test_subscriber_is_notified_until_it_unsubscribes(ground: Any, base: str, pl
         assert await stage(session) == "flying"
         await asyncio.sleep(0.6)
         assert len(updated) <= 4, "nothing changes, and nothing is told"
-        await session.unsubscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
+        await session.unsubscribe_resource("rtshcua://flight")
         updated.clear()
         peers[0].write(b'{"type":"close","seq":5,"ending":"completed"}\n')
         await until("rtshcua://log")
@@ -294,7 +303,26 @@ def test_subscriber_is_notified_until_it_unsubscribes(ground: Any, base: str, pl
 
 
 @pytest.mark.slow
-def test_modules_are_loaded_before_the_greeting(ground: Any, base: str, place: Path) -> None:
+def test_listener_of_a_stateless_host_is_notified(ground: Any, base: str, place: Path) -> None:
+    async def work(session: Client) -> None:
+        peers: list[asyncio.StreamWriter] = []
+        door = await asyncio.start_unix_server(lambda _, peer: peers.append(peer), str(place))
+        async with session.listen(resource_subscriptions=["rtshcua://flight", "rtshcua://log"]) as changes:
+            while not peers:
+                await asyncio.sleep(0.02)
+            peers[0].write(b'{"type":"hello","vehicle":"quad-07","flight":"ab"}\n')
+            told = await anext(aiter(changes))
+            assert told.uri == "rtshcua://flight"
+            (found,) = (await session.read_resource("rtshcua://flight", cache_mode="bypass")).contents
+            assert json.loads(found.text)["stage"] == "waiting"  # type: ignore[union-attr]
+        door.close()
+        peers[0].close()
+
+    session_of(ground, base, place, work, mode=AUTO)
+
+
+@pytest.mark.slow
+def test_modules_are_loaded_while_the_host_is_greeted(ground: Any, base: str, place: Path) -> None:
     """A call that comes with the greeting finds the compiler there, and waits for the policy alone."""
     words = ["mcp", base, "--to", str(place), "--with", str(POLICY)]
     command = [sys.executable, "-X", "importtime", "-m", "rtshcua", *words]
@@ -329,7 +357,8 @@ def test_key_without_a_trust_root_is_refused(ground: Any, base: str, place: Path
 
 @pytest.mark.clients
 @pytest.mark.long
-def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path) -> None:
+@BOTH
+def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path, mode: str) -> None:
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
     progress: list[float] = []
@@ -338,13 +367,14 @@ def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path) -> No
     async def heard(now: float, total: float | None, message: str | None) -> None:
         progress.append(now)
 
-    async def work(session: ClientSession) -> None:
+    async def work(session: Client) -> None:
         vehicle: dict[str, Any] = {}
         while not (vehicle.get("untrusted", {}).get("state") or {}).get("ready"):
             vehicle = await call(session, "describe_vehicle")
             await asyncio.sleep(0.2)
         assert vehicle["stage"] == "waiting"
-        await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
+        if mode == LEGACY:
+            await session.subscribe_resource("rtshcua://flight")
         at_s = time.monotonic()
         ticket = await call(session, "propose_mission", mission=PROPOSAL, idempotency_key="one")
         took_s = time.monotonic() - at_s
@@ -364,11 +394,11 @@ def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path) -> No
         while not status["over"]:
             arguments = {"ticket": ticket["ticket"], "wait_s": 10}
             found = await session.call_tool("mission_status", arguments, progress_callback=heard)
-            status = found.structuredContent or {}
-            assert not found.isError, found
+            status = found.structured_content or {}
+            assert not found.is_error, found
         assert (status["state"], status["ending"]) == ("admitted", "completed"), status
         assert progress
-        assert set(updated) == {"rtshcua://flight"}
+        assert set(updated) == ({"rtshcua://flight"} if mode == LEGACY else set())
         assert (await call(session, "mission_status", ticket=replaced["ticket"]))["state"] == "admitted"
         decided = [each for each in await evidence(session) if each.get("type") == "decision"]
         steps = [each for each in decided if each["kind"] == STEP]
@@ -382,7 +412,7 @@ def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path) -> No
         assert len(records["untrusted"]["records"]) == 5
         print(f"proposed in {took_s * 1000:.0f} ms")
 
-    session_of(ground, base, place, work, heard=updated.append)
+    session_of(ground, base, place, work, mode=mode, heard=updated.append)
     assert run.end().code == 0, run.stderr
     assert run.dispatched() == ["takeoff", "goto", "return_home"]
     verified = ground.start("verify-log", "--audit", str(run.folder), "--json").end()
@@ -395,7 +425,7 @@ def test_agents_cancellation_flies_the_contingency(ground: Any, base: str, place
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
 
-    async def work(session: ClientSession) -> None:
+    async def work(session: Client) -> None:
         vehicle: dict[str, Any] = {}
         while not (vehicle.get("untrusted", {}).get("state") or {}).get("ready"):
             vehicle = await call(session, "describe_vehicle")
@@ -459,13 +489,13 @@ def status_of(port: int, **headers: str) -> int:
         link.close()
 
 
-def test_http_serves_only_the_token_holder(ground: Any, base: str, place: Path) -> None:
+@BOTH
+def test_http_serves_only_the_token_holder(ground: Any, base: str, place: Path, mode: Any) -> None:
     updated: list[str] = []
 
     async def message(what: Any) -> None:
-        told = what.root if isinstance(what, types.ServerNotification) else None
-        if isinstance(told, types.ResourceUpdatedNotification):
-            updated.append(str(told.params.uri))
+        if isinstance(what, types.ResourceUpdatedNotification):
+            updated.append(str(what.params.uri))
 
     with served(ground, base, place) as (port, token):
         right = {"Authorization": f"Bearer {token}"}
@@ -474,19 +504,32 @@ def test_http_serves_only_the_token_holder(ground: Any, base: str, place: Path) 
         assert status_of(port, **right, Origin="https://evil.example") == 403
         assert status_of(port, **right, Host="evil.example") == 421
         assert status_of(port, **right) == 400, "the protocol's own answer to what is in no session"
+        assert status_of(port, **right, **{"Mcp-Protocol-Version": STATELESS}) == 400, "nor has an envelope"
         bound = [line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
         assert [each for each in bound if each.endswith(f":{port:04X}") and not each.startswith("0100007F")] == []
 
+        async def followed(session: Client) -> None:
+            if mode == LEGACY:
+                await session.subscribe_resource("rtshcua://flight")
+                return
+            async with session.listen(resource_subscriptions=["rtshcua://flight"]) as changes:
+                async for each in changes:
+                    updated.append(each.uri)  # type: ignore[union-attr]
+                    return
+
         async def work() -> None:
             async with (
-                httpx.AsyncClient(headers=right, timeout=30) as client,
-                streamable_http_client(f"http://127.0.0.1:{port}/mcp", http_client=client) as (read, write, _),
-                ClientSession(read, write, message_handler=message) as session,
-            ):
-                await session.initialize()
+                httpx2.AsyncClient(headers=right, timeout=30) as client,
+                Client(
+                    streamable_http_client(f"http://127.0.0.1:{port}/mcp", http_client=client), mode=mode,
+                    message_handler=message,
+                ) as session,
+                anyio.create_task_group() as tasks,
+            ):  # fmt: skip
                 assert (await call(session, "check_mission", mission=PROPOSAL))["accepted"]
                 assert (await call(session, "cancel"))["code"] == "not-flying"
-                await session.subscribe_resource("rtshcua://flight")  # type: ignore[arg-type]
+                tasks.start_soon(followed, session)
+                await asyncio.sleep(0.5)
                 peers: list[asyncio.StreamWriter] = []
                 door = await asyncio.start_unix_server(lambda _, peer: peers.append(peer), str(place))
                 while not peers:
@@ -526,13 +569,13 @@ def test_flight_ends_without_a_dead_host(ground: Any, base: str, place: Path) ->
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
 
-    async def flood(session: ClientSession) -> None:
+    async def flood(session: Client) -> None:
         async with anyio.create_task_group() as calls:
             for number in range(100):
                 name = ("describe_vehicle", "explain_decision", "read_evidence", "cancel ")[number % 4]
                 calls.start_soon(session.call_tool, name, {})
 
-    async def work(session: ClientSession) -> None:
+    async def work(session: Client) -> None:
         while not ((await call(session, "describe_vehicle"))["untrusted"]["state"] or {}).get("ready"):
             await asyncio.sleep(0.2)
         ticket = (await call(session, "propose_mission", mission=PROPOSAL, idempotency_key="one"))["ticket"]
@@ -576,10 +619,17 @@ def test_scripted_host_flies_with_the_plug_in(ground: Any, base: str, place: Pat
     assert run.end().code == 0, run.stderr
 
 
+#: what each request of 2026-07-28 says of its client
+ENVELOPE = {
+    "io.modelcontextprotocol/protocolVersion": STATELESS, "io.modelcontextprotocol/clientCapabilities": {},
+    "io.modelcontextprotocol/clientInfo": {"name": "t", "version": "1"},
+}  # fmt: skip
+
+
 class _Bare:
     """The server over its streams, line by line, for a host that does what no client of the SDK does."""
 
-    def __init__(self, ground: Any, base: str, place: Path) -> None:
+    def __init__(self, ground: Any, base: str, place: Path, *, stateless: bool = False) -> None:
         words = [ground.program, "mcp", base, "--to", str(place), "--with", str(POLICY)]
         self.process = subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
@@ -588,13 +638,19 @@ class _Bare:
         self._heard: queue.Queue[bytes] = queue.Queue()
         self._hearing = threading.Thread(target=self._hear, daemon=True)
         self._hearing.start()
+        self._envelope = {"_meta": ENVELOPE} if stateless else {}
+        if stateless:
+            self.say({"id": 0, "method": "server/discover", "params": {}})
+            self.until(0)
+            return
         hello = {"protocolVersion": "2025-11-25", "capabilities": {}, "clientInfo": {"name": "t", "version": "1"}}
         self.say({"id": 0, "method": "initialize", "params": hello})
         self.until(0)
         self.say({"method": "notifications/initialized"})
 
     def say(self, *messages: dict[str, Any]) -> None:
-        self.write(b"".join(json.dumps({"jsonrpc": "2.0"} | each).encode() + b"\n" for each in messages))
+        told = [each | {"params": each.get("params", {}) | self._envelope} for each in messages]
+        self.write(b"".join(json.dumps({"jsonrpc": "2.0"} | each).encode() + b"\n" for each in told))
 
     def write(self, octets: bytes) -> None:
         assert self.process.stdin is not None
@@ -616,6 +672,10 @@ class _Bare:
             if said.get("id") == number:
                 return said
         raise AssertionError(f"it ended before it answered, with {self.process.wait(20)}")
+
+    def rest(self) -> list[dict[str, Any]]:
+        """All that it said and that was not read, once it has ended."""
+        return [json.loads(line) for line in iter(self._heard.get, b"")]
 
     def end(self) -> int:
         assert self.process.stdin is not None
@@ -640,6 +700,29 @@ def test_host_is_served_after_cancelling_many_calls(ground: Any, base: str, plac
     server.say(_called(500, "describe_vehicle"))
     assert server.until(500)["result"]["structuredContent"]["stage"] == "unreachable"
     assert server.end() == 0
+
+
+@BOTH
+def test_what_was_asked_before_the_input_ends_is_answered(ground: Any, base: str, place: Path, mode: str) -> None:
+    """Also a call that waits, and one that came as the last of all."""
+    with socket.socket(socket.AF_UNIX) as vehicle:
+        vehicle.bind(str(place))
+        vehicle.listen()
+        server = _Bare(ground, base, place, stateless=mode == AUTO)
+        link, _ = vehicle.accept()
+        link.sendall(b'{"type":"hello","vehicle":"quad-07","flight":"ab"}\n')
+        server.say(_called(1, "propose_mission", mission=PROPOSAL, idempotency_key="k"))
+        ticket = server.until(1)["result"]["structuredContent"]["ticket"]
+        waits = _called(2, "mission_status", ticket=ticket, wait_s=60)
+        server.say(waits, *(_called(number, mission=PROPOSAL) for number in range(3, 9)))
+        began_s = time.monotonic()
+        code = server.end()
+        assert time.monotonic() - began_s < 20
+        answers = {each["id"]: each for each in server.rest() if "id" in each}
+        assert answers[2]["result"]["structuredContent"]["state"] == "submitted"
+        assert all(answers[number]["result"]["structuredContent"]["accepted"] for number in range(3, 9))
+        assert code == 0
+        link.close()
 
 
 def test_malformed_line_is_answered_and_the_session_continues(ground: Any, base: str, place: Path) -> None:

@@ -7,8 +7,8 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-_TYPES: Final = {"object": dict, "string": str, "integer": int}
-_ASKED: Final = {"object": "an object", "string": "a text", "integer": "a whole number"}
+_TYPES: Final = {"object": dict, "string": str, "integer": int, "boolean": bool}
+_ASKED: Final = {"object": "an object", "string": "a text", "integer": "a whole number", "boolean": "true or false"}
 _FOUND: Final = {
     dict: "an object", list: "a list", str: "a text", bool: "true or false", int: "a number", float: "a number",
     type(None): "null",
@@ -45,7 +45,7 @@ def _value(name: str, field: Mapping[str, Any], value: Any) -> Any:
         value = _unquoted(value)
     if kind == "integer" and isinstance(value, float) and value.is_integer():
         value = int(value)  # the same number to JSON Schema
-    if isinstance(value, bool) or not isinstance(value, _TYPES[kind]):
+    if isinstance(value, bool) != (kind == "boolean") or not isinstance(value, _TYPES[kind]):
         help = f"pass {_ASKED[kind]} as `{name}`"
         if isinstance(value, str) and kind == "integer" and value.isascii() and value.isdecimal():
             help = f"write {int(value[:18])} without quotes as `{name}`"

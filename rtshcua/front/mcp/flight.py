@@ -137,9 +137,9 @@ class Following:
         return "flying" if self.mission else "waiting"
 
     def await_first(self) -> None:
-        """Wait for a short time until the vehicle has identified itself or cannot be reached."""
+        """Wait for a short time until the vehicle has told its state or cannot be reached."""
         with self.turn:
-            self.turn.wait_for(lambda: self.connected or self._attempts > 0, FIRST_S)
+            self.turn.wait_for(lambda: bool(self.vehicle) or self._attempts > 0, FIRST_S)
 
     def await_current(self) -> None:
         """Wait for a short time until the fields describe the present flight.

@@ -1,8 +1,8 @@
 """Requests over HTTP before the SDK sees them: what is no message is refused here, as over the standard streams.
 
 The SDK builds whatever JSON a body has, millions of values, takes a number that JSON-RPC knows no answer to for a
-notification, and never answers the first of two requests with one id. Sources: MCP 2025-11-25, transports (an answer of
-HTTP 400 with a JSON-RPC error); ASGI 3.0, HTTP.
+notification, and never answers the first of two requests with one id. Sources: MCP 2025-11-25 and 2026-07-28, transports
+(an answer of HTTP 400 with a JSON-RPC error; of 404 to an unknown method of the latter); ASGI 3.0, HTTP.
 """
 
 import asyncio
@@ -10,6 +10,7 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from contextlib import AsyncExitStack
 from typing import Any, Final
 
+from rtshcua.front.mcp.greeting import HANDSHAKE_VERSIONS
 from rtshcua.front.mcp.messages import MOST_OCTETS, NO_REQUEST, Wrong, read_message, unknown_method
 
 #: how long a body may take to come, and to wait for another large one, in seconds
@@ -17,6 +18,8 @@ PATIENCE_S: Final = 10.0
 #: a body of more octets is large: there is one of these at a time, until it is answered
 LARGE: Final = 1 << 16
 _SESSION: Final = b"mcp-session-id"
+_VERSION: Final = b"mcp-protocol-version"
+_WITH_SESSIONS: Final = frozenset(version.encode() for version in HANDSHAKE_VERSIONS)
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -48,7 +51,8 @@ class Bodies:
         read = read_message(body)
         unknown = None if isinstance(read, Wrong) else unknown_method(read)
         if unknown is not None:
-            await _say(send, 200, unknown.answer())
+            stateless = any(name == _VERSION and value not in _WITH_SESSIONS for name, value in scope["headers"])
+            await _say(send, 404 if stateless else 200, unknown.answer())
             return
         asked = None if isinstance(read, Wrong) else self._asked(read, scope)
         if asked in self._open:

@@ -1,7 +1,7 @@
 """JSON-RPC messages of a host, from octets and to octets: what is no message is refused, with its id if that is known.
 
 The SDK reads more than the protocol has (an id that is no number is taken for none, half a surrogate pair for a
-character) and cannot write all that it read. Sources: JSON-RPC 2.0, sections 4 and 5; MCP 2025-11-25, transports;
+character) and cannot write all that it read. Sources: JSON-RPC 2.0, sections 4 and 5; MCP 2026-07-28, transports;
 RFC 7493 (I-JSON): no lone surrogates, and no key twice in an object.
 """
 
@@ -197,8 +197,8 @@ _MOST_TOLD: Final = 100
 
 METHODS: Final = frozenset({
     "ping", "initialize", "completion/complete", "logging/setLevel", "prompts/get", "prompts/list", "resources/list",
-    "resources/templates/list", "resources/read", "resources/subscribe", "resources/unsubscribe", "tools/call",
-    "tools/list", "tasks/get", "tasks/result", "tasks/list", "tasks/cancel",
+    "resources/templates/list", "resources/read", "resources/subscribe", "resources/unsubscribe", "server/discover",
+    "subscriptions/listen", "tools/call", "tools/list",
 })  # fmt: skip
 
 

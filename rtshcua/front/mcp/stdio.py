@@ -10,10 +10,12 @@ from contextlib import asynccontextmanager, suppress
 from typing import Any, Final
 
 import anyio
+import mcp_types as types
 from anyio.abc import ObjectReceiveStream, ObjectSendStream
-from mcp import types
 from mcp.shared.message import SessionMessage
+from pydantic import TypeAdapter
 
+from rtshcua.front.mcp.greeting import Begun
 from rtshcua.front.mcp.messages import ENDS, MOST_OCTETS, NO_REQUEST, Wrong, line_of, read_message, unknown_method
 
 #: octets that are read at once, and written: a pipe that can be written to has room for these (pipe(7), PIPE_BUF)
@@ -21,8 +23,9 @@ _READ: Final = 1 << 16
 _WRITTEN: Final = 4_096
 #: requests that wait for their answers at a time
 MOST_OPEN: Final = 256
-#: how long a host that has closed its end may still take what was answered, in seconds
-_LAST_S: Final = 1.0
+#: how long a host that has closed its end is still answered, and may take what was answered, in seconds
+_LAST_S: Final = 10.0
+_MESSAGE: Final[TypeAdapter[types.JSONRPCMessage]] = TypeAdapter(types.JSONRPCMessage)
 
 
 class Lines:
@@ -61,34 +64,52 @@ class _Gone(Exception):
 class _Host:
     """The host behind two descriptors."""
 
-    def __init__(self, incoming: int, outgoing: int, messages: ObjectSendStream[SessionMessage | Exception]) -> None:
+    def __init__(
+        self, incoming: int, outgoing: int, messages: ObjectSendStream[SessionMessage | Exception], begun: Begun
+    ) -> None:
         self._incoming, self._outgoing = incoming, outgoing
+        self._begun = begun
         self._messages = messages
         self._writing = anyio.Lock()
         self._open: set[int | str] = set()  # requests that wait for their answers
+        self._answered = anyio.Event()  # of these, the latest that was answered, replaced by each
+        self.leaving = anyio.Event()  # it says nothing more
         self.wrong: OSError | None = None  # why nothing can be read or written, where the host did not end
 
     async def read(self) -> None:
-        """Its lines to the server until it ends; what is no message is answered."""
+        """Its lines to the server until it ends and what it asked is answered; what is no message is answered here."""
         lines = Lines()
-        with suppress(_Gone, anyio.BrokenResourceError, anyio.ClosedResourceError):  # the server ended
+        try:
             async with self._messages:
                 while data := await self._some():
                     for line, whole in lines.take(data):
                         await self._take(line, whole=whole)
                 for line, whole in lines.end():
                     await self._take(line, whole=whole)
+                self.leaving.set()
+                while self._open:  # the server ends with its input, and leaves open what it has not answered
+                    await self._answered.wait()
+        except (_Gone, anyio.BrokenResourceError, anyio.ClosedResourceError):
+            pass  # the server ended, or nobody reads
+        finally:
+            self.leaving.set()
 
     async def write(self, answers: ObjectReceiveStream[SessionMessage]) -> None:
         """What the server says, until it ends, or until nobody is there to read it."""
         with suppress(_Gone):
             async for answer in answers:
-                told = answer.message.root.model_dump(by_alias=True, mode="json", exclude_none=True)
-                if isinstance(answer.message.root, types.JSONRPCResponse | types.JSONRPCError):
-                    self._open.discard(answer.message.root.id)
-                await self._put(line_of(told))
+                message = answer.message
+                known = message.id if isinstance(message, types.JSONRPCResponse | types.JSONRPCError) else None
+                if known is not None and known == self._begun.answered:
+                    self._begun = Begun()  # it has that answer already
+                else:
+                    await self._put(line_of(message.model_dump(by_alias=True, mode="json", exclude_none=True)))
+                self._close(known)
 
     async def _some(self) -> bytes:
+        if self._begun.octets:
+            octets, self._begun = self._begun.octets, self._begun._replace(octets=b"")
+            return octets
         try:
             await _until(anyio.wait_readable, self._incoming)
             return os.read(self._incoming, _READ)
@@ -106,12 +127,20 @@ class _Host:
             await self._put(read.answer())
             return
         try:
-            message = types.JSONRPCMessage.model_validate(read)
+            message = _MESSAGE.validate_python(read)
         except ValueError:
-            self._open.discard(read.get("id", ""))
+            self._close(read.get("id", ""))
             await self._put(Wrong(NO_REQUEST, "the message is not a message of MCP", read.get("id")).answer())
             return
         await self._messages.send(SessionMessage(message))
+        if read["method"] == "notifications/cancelled":  # which is never answered
+            self._close(read.get("params", {}).get("requestId"))
+
+    def _close(self, known: Any) -> None:
+        if isinstance(known, int | str):
+            self._open.discard(known)
+        self._answered.set()
+        self._answered = anyio.Event()
 
     def _opened(self, request: dict[str, Any]) -> dict[str, Any] | Wrong:
         known = request["id"]
@@ -139,30 +168,32 @@ class _Host:
 
 
 @asynccontextmanager
-async def streams(incoming: int, outgoing: int) -> AsyncIterator[tuple[Any, Any]]:
-    """What the host says and what it is answered, over two descriptors that stay open.
+async def streams(incoming: int, outgoing: int, begun: Begun) -> AsyncIterator[tuple[Any, Any, anyio.Event]]:
+    """What the host says and what it is answered, over two descriptors that stay open; and what is set when it says
+    nothing more.
 
     Ends where the host does, whether it still reads or not. Raises OSError where its messages cannot be read, or
     nothing can be written, for another reason.
     """
     to_server, messages = anyio.create_memory_object_stream[SessionMessage | Exception](0)
     answers, to_host = anyio.create_memory_object_stream[SessionMessage](0)
-    host = _Host(incoming, outgoing, to_server)
+    host = _Host(incoming, outgoing, to_server, begun)
     # closed when all is over: what the server says to a stream that was closed under it is an error
     with to_server, messages, answers, to_host:
         async with anyio.create_task_group() as tasks:
 
-            async def read() -> None:
-                await host.read()
+            async def end() -> None:
+                await host.leaving.wait()
                 tasks.cancel_scope.deadline = anyio.current_time() + _LAST_S
 
             async def write() -> None:
                 await host.write(to_host)
                 tasks.cancel_scope.cancel()
 
-            tasks.start_soon(read)
+            tasks.start_soon(host.read)
             tasks.start_soon(write)
-            yield messages, answers
+            tasks.start_soon(end)
+            yield messages, answers, host.leaving
             answers.close()
     if host.wrong is not None:
         raise host.wrong

@@ -2,8 +2,10 @@
 
 import gc
 import socket
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +23,7 @@ from rtshcua.front.cli.interrupts import breakable
 from rtshcua.front.cli.options.conflicts import conflict_of
 from rtshcua.front.cli.unlock import unlock
 from rtshcua.front.mcp.access import HOST, PATH, BadToken, token_of
+from rtshcua.front.mcp.greeting import greet
 from rtshcua.wire import cose
 from rtshcua.wire.bundle import MAX_BUNDLE, envelopes, policy_digest
 from rtshcua.wire.keys import Duty, SigningKey
@@ -66,12 +69,7 @@ def mcp(
     Exit codes: 0 the host ended the session; 2 wrong command line, or the extra is missing; 3 a file cannot be read, or
     the port is in use; 4 the key is not an agent's, or other users can read the token; 74 output cannot be written.
     """
-    try:
-        with _loading():
-            from rtshcua.front.mcp.server import serve, serve_http
-    except ModuleNotFoundError as missing:
-        if (missing.name or "").partition(".")[0] not in ("mcp", "anyio"):
-            raise
+    if find_spec("mcp") is None or find_spec("mcp_types") is None:
         return fail(ExitCode.USAGE, "the MCP server is not installed", 'in the checkout: `pip install ".[mcp]"`')
     problem = conflict_of(context)
     if problem is not None:
@@ -83,14 +81,13 @@ def mcp(
     for path in with_:
         read_regular(path, 1)
 
-    with _loading():  # before the handshake: the host may call a tool at once, and that must take under 100 ms
-        from rtshcua.app.propose import Missions
-        from rtshcua.front.mcp.flight import Following
-        from rtshcua.front.mcp.tools import Signer, Tools
-
-    def make() -> Tools:
-        signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))
+    def make() -> object:
         with _loading():
+            from rtshcua.app.propose import Missions
+            from rtshcua.front.mcp.flight import Following
+            from rtshcua.front.mcp.tools import Signer, Tools
+
+            signer = Signer(key, envelope, digest, lambda policy, mission: check_trusted(store, key, policy, mission))
             offered = Tools(Missions(with_), signer, to, Following(to))
             gc.freeze()
         return offered
@@ -99,12 +96,30 @@ def mcp(
         say(f"note: `{to}` does not exist yet; `rtshcua run BUNDLE --wait --agent-socket {to}` creates it")
     if http is None or token_file is None:
         with breakable():
-            serve(make)
+            _over_streams(make)
         return ExitCode.OK
-    return _over_http(http, token_file, lambda listener, token: serve_http(make, listener, token))
+    return _over_http(http, token_file, make)
 
 
-def _over_http(port: int, token_file: Path, serve: Callable[[socket.socket, bytes], None]) -> ExitCode:
+def _over_streams(make: Callable[[], object]) -> None:
+    """Serve the standard streams. The host's greeting is answered while the SDK and the compiler load."""
+    loading = threading.Thread(target=_load, daemon=True)
+    loading.start()
+    begun = greet(0, 1)
+    loading.join()
+    from rtshcua.front.mcp.server import serve
+
+    serve(make, begun)
+
+
+def _load() -> None:
+    """Load the modules of the server and its tools. Errors are reported where the modules are used."""
+    with _loading(), suppress(ImportError):
+        import rtshcua.front.mcp.server
+        import rtshcua.front.mcp.tools  # noqa: F401
+
+
+def _over_http(port: int, token_file: Path, make: Callable[[], object]) -> ExitCode:
     """Listen on a port of this machine, and serve clients that send the token."""
     try:
         token = token_of(token_file)
@@ -119,7 +134,10 @@ def _over_http(port: int, token_file: Path, serve: Callable[[socket.socket, byte
             return fail(ExitCode.INPUT, f"cannot listen at {HOST}:{port}: {words_of(error)}", "choose another port")
         say(f"serving http://{HOST}:{listener.getsockname()[1]}{PATH} to clients that send the token in `{token_file}`")
         with breakable():
-            serve(listener, token)
+            _load()
+            from rtshcua.front.mcp.server import serve_http
+
+            serve_http(make, listener, token)
     return ExitCode.OK
 
 

@@ -8,7 +8,7 @@ import pytest
 from rtshcua.front.mcp.arguments import Unfit, fitted
 from rtshcua.front.mcp.server import TOOLS
 
-SCHEMAS = {each.name: each.inputSchema for each in TOOLS}
+SCHEMAS = {each.name: each.input_schema for each in TOOLS}
 MISSION = {"format": "rtshcua/mission-spec", "phases": [{"name": "a"}]}
 
 

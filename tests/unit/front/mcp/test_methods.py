@@ -2,8 +2,8 @@
 
 from typing import get_args
 
+import mcp_types as types
 import pytest
-from mcp import types
 
 from rtshcua.front.mcp.messages import METHODS, NO_METHOD, unknown_method
 
@@ -30,5 +30,5 @@ def test_a_notification_is_never_answered() -> None:
 
 
 def test_the_methods_are_those_of_the_sdk() -> None:
-    requests = get_args(types.ClientRequest.model_fields["root"].annotation)
+    requests = get_args(types.ClientRequest)
     assert {name for each in requests for name in get_args(each.model_fields["method"].annotation)} == METHODS

@@ -11,9 +11,10 @@ import pytest
 
 pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
 import anyio
-from mcp import types
+import mcp_types as types
 from mcp.shared.message import SessionMessage
 
+from rtshcua.front.mcp.greeting import Begun
 from rtshcua.front.mcp.messages import ENDS, MOST_OCTETS
 from rtshcua.front.mcp.stdio import MOST_OPEN, Lines, streams
 
@@ -61,12 +62,12 @@ def served(said: bytes, *, answers: bool = True, reads: bool = True, more: Any =
     """The answers to a host that sends these lines and ends; requests get an empty answer, or none."""
 
     async def serve(ours_in: int, ours_out: int) -> None:
-        async with streams(ours_in, ours_out) as (incoming, outgoing):
+        async with streams(ours_in, ours_out, Begun()) as (incoming, outgoing, _):
             async for message in incoming:
-                root = message.message.root
+                root = message.message
                 if answers and isinstance(root, types.JSONRPCRequest):
                     answer = types.JSONRPCResponse(jsonrpc="2.0", id=root.id, result=more or {})
-                    await outgoing.send(SessionMessage(types.JSONRPCMessage(answer)))
+                    await outgoing.send(SessionMessage(answer))
 
     with pipes() as (says, hears, ours_in, ours_out):
         os.write(says, said)
@@ -110,10 +111,10 @@ def test_a_host_that_is_gone_ends_it() -> None:
 
 def test_a_host_that_ends_without_reading_ends_it() -> None:
     async def serve(ours_in: int, ours_out: int) -> None:
-        async with streams(ours_in, ours_out) as (incoming, outgoing):
+        async with streams(ours_in, ours_out, Begun()) as (incoming, outgoing, _):
             async for message in incoming:
-                answer = types.JSONRPCResponse(jsonrpc="2.0", id=message.message.root.id, result={"a": "x" * 200_000})
-                await outgoing.send(SessionMessage(types.JSONRPCMessage(answer)))
+                answer = types.JSONRPCResponse(jsonrpc="2.0", id=message.message.id, result={"a": "x" * 200_000})
+                await outgoing.send(SessionMessage(answer))
 
     with pipes() as (says, _, ours_in, ours_out):
         os.write(says, request(1) + request(2))
@@ -123,7 +124,7 @@ def test_a_host_that_ends_without_reading_ends_it() -> None:
 
 def test_a_stream_that_cannot_be_read_or_written_is_an_error_of_its_own() -> None:
     async def serve(ours_in: int, ours_out: int) -> None:
-        async with streams(ours_in, ours_out) as (incoming, _):
+        async with streams(ours_in, ours_out, Begun()) as (incoming, _, _):
             async for _ in incoming:
                 pass
 

@@ -15,23 +15,22 @@ import pytest
 from rtshcua.app.propose import Missions, ProposalAnswer
 from rtshcua.front.mcp import tools as desks
 from rtshcua.front.mcp.flight import Following, understood
-from rtshcua.front.mcp.tools import Misused, Signer, Tools
+from rtshcua.front.mcp.tools import Misused, Tools
 from rtshcua.ground.agent.specification import load_specification
 from rtshcua.wire import cose, names
 from rtshcua.wire.binding import bind
-from rtshcua.wire.bundle import parse, policy_digest, policy_payload
+from rtshcua.wire.bundle import parse
 from rtshcua.wire.cancellation import CancellationDocument
 from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
-from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.keys import Duty
 from rtshcua.wire.request import STEP
+from unit.front.mcp.conftest import AGENT
 from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))
 HIGH = deepcopy(PROPOSAL)
 HIGH["phases"][0]["steps"][0]["arguments"]["altitude"] = "4000 m"
-POLICY = SigningKey.from_seed(bytes([2]) * 32, duty=Duty.POLICY, development=True)
-AGENT = SigningKey.from_seed(bytes([3]) * 32, duty=Duty.MISSION, development=True)
 
 
 #: the fields of a decision beside its step; all values of the state are 0
@@ -44,34 +43,6 @@ RECORDED = {
         "remaining_us": 60_000, "vehicle": "quad-07",
     },
 }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def missions() -> Missions:
-    return Missions([CHECKOUT / "policies/bridge_inspection.rts"])
-
-
-@pytest.fixture
-def handed(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
-    """The documents sent to the vehicle, which accepts all."""
-    found: list[bytes] = []
-
-    def hand_in(socket: Path, document: bytes) -> tuple[str, str]:
-        found.append(document)
-        return "accepted", "it flies"
-
-    monkeypatch.setattr(desks, "hand_in", hand_in)
-    return found
-
-
-@pytest.fixture
-def desk(missions: Missions, tmp_path: Path) -> Tools:
-    payload = policy_payload(missions.policy)
-    envelope = cose.sign1(payload, key=POLICY, duty=Duty.POLICY, content_type=names.POLICY.content_type)
-    following = Following(tmp_path / "none.sock")
-    following.end()
-    signer = Signer(AGENT, envelope, policy_digest(payload), lambda policy, mission: None)
-    return Tools(missions, signer, tmp_path / "none.sock", following)
 
 
 def status(desk: Tools, ticket: str) -> str:

@@ -76,9 +76,10 @@ def read_json(file: str, data: bytes) -> tuple[Source, JsonTree | None, tuple[Di
     return source, JsonTree(value, reader.spans, reader.keys), tuple(reader.found)
 
 
-def read_json_text(text: str, again: bool = True) -> tuple[Any, str]:
+def read_json_text(text: str, again: bool = True, explained: bool = True) -> tuple[Any, str]:
     """The JSON value that a text holds and nothing else, also between the marks that models put around code, or in a
     text once more; or None, and what is wrong. Numbers may have decimals: whoever reads the value refuses them.
+    Not `explained`: without the place of the error, which takes a second for the longest text.
     """
     if len(text) > MAX_BYTES:
         return None, f"the text has {len(text)} characters; the limit is {MAX_BYTES}"
@@ -88,8 +89,8 @@ def read_json_text(text: str, again: bool = True) -> tuple[Any, str]:
     try:
         value = json.loads(plain, object_pairs_hook=_once)
     except (ValueError, RecursionError):
-        source, _, found = read_json("", plain.encode("utf-8", "surrogatepass"))
-        if not found or found[0].span is None:
+        source, _, found = read_json("", plain.encode("utf-8", "surrogatepass") if explained else b"")
+        if not explained or not found or found[0].span is None:
             return None, "the text is not JSON"
         at = source.position(found[0].span.start)
         return None, f"line {at.line}, column {at.column} of the JSON: {found[0].message}"

@@ -120,31 +120,35 @@ def read_place(value: Any) -> ReadPlace:
     """Read a text, or an object with a latitude and a longitude, as coordinates. Two numbers alone are unclear: some
     write the longitude first.
     """
-    named = isinstance(value, dict)
-    if named:
-        ordered = [
-            [each for key, each in value.items() if str(key).casefold() in keys] for keys in (_LATITUDE, _LONGITUDE)
-        ]
-        if len(value) != 2 or [len(each) for each in ordered] != [1, 1]:
-            return ReadPlace(None, "")
-        value = ", ".join(str(each) for (each,) in ordered)
-    elif isinstance(value, list):
-        value = ", ".join(map(str, value))
-    found = _PAIR.fullmatch(_unquoted(_ascii(value))) if isinstance(value, str) and len(value) <= _LONGEST else None
+    text = _pair_of(value)
+    found = _PAIR.fullmatch(_unquoted(_ascii(text))) if len(text) <= _LONGEST else None
     if found is None:
         return ReadPlace(None, "")
     first, second = (_coordinate(found, each) for each in ("_1", "_2"))
     points = first[1] + second[1]
     if points in ("EN", "ES", "WN", "WS"):
         first, second = second, first
-    elif points not in ("", "NE", "NW", "SE", "SW") or (points and "-" in found["sign_1"] + found["sign_2"]):
+    elif points not in ("", "NE", "NW", "SE", "SW"):
         return ReadPlace(None, "")
     place = f"{_degrees(*first, 'NS')}, {_degrees(*second, 'EW')}"
-    if re.fullmatch(COORDINATES, place) is None:
+    signed = points and "-" in found["sign_1"] + found["sign_2"]
+    if signed or re.fullmatch(COORDINATES, place) is None:
         return ReadPlace(None, "")
-    if not points and not named:
+    if not points and not isinstance(value, dict):
         return ReadPlace(None, f"unclear which number is the latitude; if it is the first one, write `{place}`")
     return ReadPlace(place, _SAME)
+
+
+def _pair_of(value: Any) -> str:
+    """The text of a text, a list, or an object of a latitude and a longitude, in this order; else empty."""
+    if isinstance(value, dict):
+        named = {str(key).casefold(): each for key, each in value.items()}
+        ordered = [[named[key] for key in keys if key in named] for keys in (_LATITUDE, _LONGITUDE)]
+        value = [each for found in ordered for each in found] if [len(each) for each in ordered] == [1, 1] else ""
+        return ", ".join(map(str, value)) if len(named) == 2 else ""
+    if isinstance(value, list):
+        return ", ".join(str(each) for each in value[:3])
+    return value if isinstance(value, str) else ""
 
 
 def _coordinate(found: "re.Match[str]", which: str) -> tuple[Fraction, str]:

@@ -39,8 +39,12 @@ _ARTICLED = {
     "integer": "a whole number",
 }  # fmt: skip
 _NOTHING: Final = object()
+#: how a text with JSON, or with marks for code around it, begins
+_JSON: Final = ("[", "{", "`")
 #: the longest name that is compared with the known ones, in characters
 _MOST_NAME = 200
+#: the longest text, in characters, that is tried as JSON, and whose error is looked for: a proposal may have many
+_MOST_JSON, _MOST_EXPLAINED = 65_536, 4_096
 
 
 class PermittedRange(NamedTuple):
@@ -330,21 +334,36 @@ class _SchemaFit:
         return _name(schema, value) if kind == "string" else (None, "")
 
     def _near_container(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
-        """Return the object or list that `value` means: as text, a list of that one value, or the only accepted one."""
-        kind, why = schema["type"], ""
-        if isinstance(value, str) and value.lstrip().startswith(("[", "{", "`")):
-            inner, why = read_json_text(value)
-            if _NAMES.get(type(inner)) == kind:
-                return inner, f"write the {'list' if kind == 'array' else 'object'} itself, not a string with JSON,"
-        elif kind == "array" and value is not None and schema.get("maxItems", 1) > 0:
-            fits = next(self.misfits(schema["items"], value, "", of), None) is None
-            return ([value], "write a list, even of one value,") if fits else (None, "")
-        if kind == "array":
+        """Return the object or list that `value` means, perhaps as text."""
+        kind = schema["type"]
+        inner, why = _json_in(value)
+        if _NAMES.get(type(inner)) == kind:
+            return inner, f"write the {'list' if kind == 'array' else 'object'} itself, not a string with JSON,"
+        if why:
             return None, why
+        return self._near_list(schema, value, of) if kind == "array" else self._near_object(schema, value, of)
+
+    def _near_list(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
+        """Return the list of a value that is accepted in it."""
+        if value is None or schema.get("maxItems", 1) == 0:
+            return None, ""
+        fits = next(self.misfits(schema["items"], value, "", of), None) is None
+        return ([value], "write a list, even of one value,") if fits else (None, "")
+
+    def _near_object(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
+        """Return the only accepted object, or None, and its keys."""
         made = {name: self._near(schema["properties"][name], None, (of[0], name))[0] for name in schema["required"]}
-        if all(each is not None for each in made.values()):
+        if (made or value is None) and all(each is not None for each in made.values()):
             return made, ""
-        return None, why or f"expected an object with {', '.join(f'`{name}`' for name in made)}"
+        keys = ", ".join(f"`{name}`" for name in made or schema["properties"])
+        return None, f"expected an object with {keys}" if keys else "expected an empty object"
+
+
+def _json_in(value: Any) -> tuple[Any, str]:
+    """Return the JSON value that a text holds, or None, and what is wrong with it; both empty if it is no such text."""
+    if isinstance(value, str) and len(value) <= _MOST_JSON and value.lstrip().startswith(_JSON):
+        return read_json_text(value, explained=len(value) <= _MOST_EXPLAINED)
+    return None, ""
 
 
 def _skill(step: Any) -> str:

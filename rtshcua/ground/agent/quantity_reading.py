@@ -136,7 +136,8 @@ def read_place(value: Any) -> ReadPlace:
         return ReadPlace(None, "")
     if not points and not isinstance(value, dict):
         return ReadPlace(None, f"unclear which number is the latitude; if it is the first one, write `{place}`")
-    return ReadPlace(place, _SAME)
+    exact = all((value * _RESOLUTION).denominator == 1 for value, _ in (first, second))
+    return ReadPlace(place, _SAME if exact else f"{_SAME}, rounded")
 
 
 def _pair_of(value: Any) -> str:

@@ -403,6 +403,8 @@ def nearest_quantity(value: Any, span: PermittedRange) -> tuple[str | None, str]
         return None, why
     if why and not span.low <= found <= span.high:
         why = f"the value is {decimal(found, span.dimension)}, out of range"
+    elif why and found.denominator != 1:
+        why += ", rounded"
     return written(min(max(round(found), span.low), span.high), span.dimension), why
 
 

@@ -11,7 +11,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 908,  # rises with each subject: last cameras, survey geometry and the formats of others
+    "modules": 910,  # rises with each subject: last cameras, surveys, formats of others, the greeting and progress for agents
     "code lines": 113_000,  # to the thousand; rises with each feature: last cameras, surveys, imports, late emulators
     "shared class names": 0,
     "of them across packages": 0,
@@ -19,7 +19,7 @@ HELD = {
     "import cycles": 0,
     "modules below 80 lines with one importer": 13,
     "functions of more than 60 lines": 0,
-    "functions of a complexity over 15": 66,
+    "functions of a complexity over 15": 65,
     "functions of a complexity over 25": 0,
     "lines of application logic in the command line": 890,
 }

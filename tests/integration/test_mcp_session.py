@@ -390,6 +390,13 @@ def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path, mode:
         assert (early["wrong"], early["code"]) == (True, "other-steps"), early
         replaced = await call(session, "replan", mission=newer, from_step_number=3, idempotency_key="two")
         assert replaced["accepted"], replaced
+        await call(session, "mission_status", ticket=replaced["ticket"], wait_s=10)
+        async with hosted(ground, base, place, mode=mode) as begun_again:
+            same = await call(begun_again, "propose_mission", mission=newer, idempotency_key="one")
+            assert (same["accepted"], same["state"]) == (True, "flying"), same
+            another = await call(begun_again, "propose_mission", mission=PROPOSAL, idempotency_key="two")
+            refused_too = await call(begun_again, "mission_status", ticket=another["ticket"], wait_s=10)
+            assert (refused_too["state"], refused_too["code"]) == ("refused", "already-flying"), refused_too
         status: dict[str, Any] = {"over": False}
         while not status["over"]:
             arguments = {"ticket": ticket["ticket"], "wait_s": 10}

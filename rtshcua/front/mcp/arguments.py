@@ -4,8 +4,11 @@ A mission that comes as a text that holds it, as some hosts send every object, i
 """
 
 import json
+import re
 from collections.abc import Mapping
 from typing import Any, Final
+
+from rtshcua.ground.agent.json_tree import read_json_text
 
 _TYPES: Final = {"object": dict, "string": str, "integer": int, "boolean": bool}
 _ASKED: Final = {"object": "an object", "string": "a text", "integer": "a whole number", "boolean": "true or false"}
@@ -14,8 +17,7 @@ _FOUND: Final = {
     type(None): "null",
 }  # fmt: skip
 MOST_SHOWN: Final = 60
-#: characters of a mission as text
-MOST_TEXT: Final = 1 << 20
+_WHOLE: Final = re.compile(r"\+?([0-9]{1,18})(?:\.0{1,9})?")
 
 
 class Unfit(Exception):
@@ -42,15 +44,16 @@ def fitted(schema: Mapping[str, Any], arguments: Mapping[str, Any]) -> dict[str,
 def _value(name: str, field: Mapping[str, Any], value: Any) -> Any:
     kind = field["type"]
     if kind == "object" and isinstance(value, str):
-        value = _unquoted(value)
+        return _unquoted(name, value)
     if kind == "integer" and isinstance(value, float) and value.is_integer():
         value = int(value)  # the same number to JSON Schema
     if isinstance(value, bool) != (kind == "boolean") or not isinstance(value, _TYPES[kind]):
         help = f"pass {_ASKED[kind]} as `{name}`"
-        if isinstance(value, str) and kind == "integer" and value.isascii() and value.isdecimal():
-            help = f"write {int(value[:18])} without quotes as `{name}`"
+        whole = _WHOLE.fullmatch(value.strip()) if isinstance(value, str) and kind == "integer" else None
+        if whole is not None:
+            help = f"write {int(whole[1])} without quotes as `{name}`"
         elif kind == "string" and isinstance(value, int | float):
-            help = f"write {json.dumps(str(value))} as `{name}`"
+            help = f"write {json.dumps(json.dumps(value))} as `{name}`"
         raise Unfit(f"`{name}` must be {_ASKED[kind]}, not {_FOUND.get(type(value), 'another type')}", help)
     least, most = field.get("minimum"), field.get("maximum")
     if (least is not None and value < least) or (most is not None and value > most):
@@ -59,17 +62,11 @@ def _value(name: str, field: Mapping[str, Any], value: Any) -> Any:
     return value
 
 
-def _unquoted(text: str) -> Any:
-    """The object that a text holds; the text where it holds none, or a key twice."""
-    try:
-        found = json.loads(text, object_pairs_hook=_once) if len(text) <= MOST_TEXT else text
-    except (ValueError, RecursionError):
-        return text
-    return found if isinstance(found, dict) else text
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) < len(pairs):
-        raise ValueError("a key is written twice")
-    return made
+def _unquoted(name: str, text: str) -> dict[str, Any]:
+    """The object that a text holds, and nothing else. Raises `Unfit`."""
+    found, why = read_json_text(text)
+    if not isinstance(found, dict):
+        why = why or f"it holds {_FOUND.get(type(found), 'another type')}"
+        help = f"pass an object as `{name}`, or a text that is exactly one object in JSON"
+        raise Unfit(f"`{name}` must be an object, not a text: {why}", help)
+    return found

@@ -36,8 +36,16 @@ class _Vehicle(msgspec.Struct):
     signals: Any = None
 
 
+class _MissionStep(msgspec.Struct):
+    phase: str = ""
+    text: str = ""
+
+
 class _Mission(msgspec.Struct):
     digest: _Octets
+    mission: str = ""
+    policy_digest: _Octets = ""
+    steps: list[_MissionStep] = []
 
 
 class _Decided(msgspec.Struct):
@@ -140,6 +148,18 @@ class Following:
         """Wait for a short time until the vehicle has told its state or cannot be reached."""
         with self.turn:
             self.turn.wait_for(lambda: bool(self.vehicle) or self._attempts > 0, FIRST_S)
+
+    def await_told(self) -> None:
+        """Wait for a short time until the vehicle has said whether it flies, or cannot be reached."""
+        with self.turn:
+            self.turn.wait_for(
+                lambda: bool(self.mission or self.waiting) or self._attempts > 0 or self._ended.is_set(), FIRST_S
+            )
+
+    def await_flying(self) -> None:
+        """Wait for a short time until the vehicle flies: another host may have proposed a mission just before."""
+        with self.turn:
+            self.turn.wait_for(lambda: self.stage == "flying" or self._ended.is_set(), FIRST_S)
 
     def await_current(self) -> None:
         """Wait for a short time until the fields describe the present flight.

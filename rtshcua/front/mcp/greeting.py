@@ -28,14 +28,14 @@ _SERVER: Final = {"name": "rtshcua", "version": __version__}
 _MOST: Final = 1 << 14
 
 
-class Begun(NamedTuple):
+class Greeted(NamedTuple):
     """What was read of a host and is to be read again, and the id of the request in it that was answered already."""
 
     octets: bytes = b""
     answered: int | str | None = None
 
 
-def greet(incoming: int, outgoing: int) -> Begun:
+def greet(incoming: int, outgoing: int) -> Greeted:
     """Read a host's first line, and answer it if it is a greeting. Errors of the streams are met again later."""
     said = b""
     with suppress(OSError):
@@ -45,14 +45,14 @@ def greet(incoming: int, outgoing: int) -> Begun:
         request = read_message(line) if end else {}
         answer = None if isinstance(request, Wrong) else answer_to(request)
         if isinstance(request, Wrong) or answer is None:
-            return Begun(said)
+            return Greeted(said)
         told = line_of({"jsonrpc": "2.0", "id": request["id"], "result": answer})
         while told:
             told = told[os.write(outgoing, told) :]
         if request["method"] == "initialize":
-            return Begun(said, request["id"])  # the SDK begins its session by it
-        return Begun(rest)
-    return Begun(said)
+            return Greeted(said, request["id"])  # the SDK begins its session by it
+        return Greeted(rest)
+    return Greeted(said)
 
 
 def answer_to(request: dict[str, Any]) -> dict[str, Any] | None:

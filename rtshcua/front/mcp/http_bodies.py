@@ -1,7 +1,7 @@
 """Requests over HTTP before the SDK sees them: what is no message is refused here, as over the standard streams.
 
 The SDK builds whatever JSON a body has, millions of values, takes a number that JSON-RPC knows no answer to for a
-notification, and never answers the first of two requests with one id. Sources: MCP 2025-11-25 and 2026-07-28, transports
+notification, and never answers the first of two requests with one id. Sources: MCP 2025-11-25, 2026-07-28, transports
 (an answer of HTTP 400 with a JSON-RPC error; of 404 to an unknown method of the latter); ASGI 3.0, HTTP.
 """
 

@@ -28,7 +28,7 @@ from rtshcua import __version__
 from rtshcua.front.mcp.access import refusal
 from rtshcua.front.mcp.arguments import Unfit, fitted
 from rtshcua.front.mcp.connections import CONNECTION, MOST, Connection
-from rtshcua.front.mcp.greeting import INSTRUCTIONS, Begun
+from rtshcua.front.mcp.greeting import INSTRUCTIONS, Greeted
 from rtshcua.front.mcp.http_bodies import Bodies
 from rtshcua.front.mcp.messages import writable
 from rtshcua.front.mcp.stdio import streams
@@ -143,7 +143,7 @@ class Opening:
             self._done.set()
 
 
-def serve(make: Callable[[], Any], begun: Begun) -> None:
+def serve(make: Callable[[], Any], begun: Greeted) -> None:
     """Serve the standard streams until the host ends the session. `make` returns the tools (`tools.Tools`)."""
     _quieten()
     anyio.run(_speak, Opening(make), begun)
@@ -155,7 +155,7 @@ def _quieten() -> None:
     logging.getLogger().addFilter(lambda _: False)  # the SDK logs to the root logger itself
 
 
-async def _speak(opening: Opening, begun: Begun) -> None:
+async def _speak(opening: Opening, begun: Greeted) -> None:
     opening.begin()
     async with streams(0, 1, begun) as (incoming, outgoing, leaving), anyio.create_task_group() as others:
         server = made(opening, others, leaving)

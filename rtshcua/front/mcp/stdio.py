@@ -15,7 +15,7 @@ from anyio.abc import ObjectReceiveStream, ObjectSendStream
 from mcp.shared.message import SessionMessage
 from pydantic import TypeAdapter
 
-from rtshcua.front.mcp.greeting import Begun
+from rtshcua.front.mcp.greeting import Greeted
 from rtshcua.front.mcp.messages import ENDS, MOST_OCTETS, NO_REQUEST, Wrong, line_of, read_message, unknown_method
 
 #: octets that are read at once, and written: a pipe that can be written to has room for these (pipe(7), PIPE_BUF)
@@ -65,7 +65,7 @@ class _Host:
     """The host behind two descriptors."""
 
     def __init__(
-        self, incoming: int, outgoing: int, messages: ObjectSendStream[SessionMessage | Exception], begun: Begun
+        self, incoming: int, outgoing: int, messages: ObjectSendStream[SessionMessage | Exception], begun: Greeted
     ) -> None:
         self._incoming, self._outgoing = incoming, outgoing
         self._begun = begun
@@ -101,7 +101,7 @@ class _Host:
                 message = answer.message
                 known = message.id if isinstance(message, types.JSONRPCResponse | types.JSONRPCError) else None
                 if known is not None and known == self._begun.answered:
-                    self._begun = Begun()  # it has that answer already
+                    self._begun = Greeted()  # it has that answer already
                 else:
                     await self._put(line_of(message.model_dump(by_alias=True, mode="json", exclude_none=True)))
                 self._close(known)
@@ -168,7 +168,7 @@ class _Host:
 
 
 @asynccontextmanager
-async def streams(incoming: int, outgoing: int, begun: Begun) -> AsyncIterator[tuple[Any, Any, anyio.Event]]:
+async def streams(incoming: int, outgoing: int, begun: Greeted) -> AsyncIterator[tuple[Any, Any, anyio.Event]]:
     """What the host says and what it is answered, over two descriptors that stay open; and what is set when it says
     nothing more.
 

@@ -4,6 +4,7 @@ The reader is strict: it refuses duplicate keys, NaN and fractions. It limits de
 so that hostile input costs little.
 """
 
+import json
 import re
 from bisect import bisect_right
 from collections.abc import Callable
@@ -25,6 +26,8 @@ MAX_VALUES: Final = 1 << 15
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _NUMBER = re.compile(r"(-?(?:0|[1-9][0-9]*))(\.[0-9]+)?([eE][-+]?[0-9]+)?")
+#: the marks that models put around code
+_FENCED = re.compile(r"```[A-Za-z0-9]*[ \t]*\r?\n(.*)\n[ \t]*```", re.DOTALL)
 _LITERALS = {"true": True, "false": False, "null": None}
 
 #: the keys and indexes that lead to a value
@@ -71,6 +74,34 @@ def read_json(file: str, data: bytes) -> tuple[Source, JsonTree | None, tuple[Di
         found = Diagnostic(stop.code, stop.message, span, stop.help)
         return source, None, (*reader.found, found)
     return source, JsonTree(value, reader.spans, reader.keys), tuple(reader.found)
+
+
+def read_json_text(text: str, again: bool = True, explained: bool = True) -> tuple[Any, str]:
+    """The JSON value that a text holds and nothing else, also between the marks that models put around code, or in a
+    text once more; or None, and what is wrong. Numbers may have decimals: whoever reads the value refuses them.
+    Not `explained`: without the place of the error, which takes a second for the longest text.
+    """
+    if len(text) > MAX_BYTES:
+        return None, f"the text has {len(text)} characters; the limit is {MAX_BYTES}"
+    plain = text.strip("\ufeff \t\r\n")
+    fenced = _FENCED.fullmatch(plain)
+    plain = plain if fenced is None else fenced[1]
+    try:
+        value = json.loads(plain, object_pairs_hook=_once)
+    except (ValueError, RecursionError):
+        source, _, found = read_json("", plain.encode("utf-8", "surrogatepass") if explained else b"")
+        if not explained or not found or found[0].span is None:
+            return None, "the text is not JSON"
+        at = source.position(found[0].span.start)
+        return None, f"line {at.line}, column {at.column} of the JSON: {found[0].message}"
+    return read_json_text(value, again=False) if again and isinstance(value, str) else (value, "")
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made = dict(pairs)
+    if len(made) < len(pairs):
+        raise ValueError("a key is written twice")
+    return made
 
 
 class _Reader:

@@ -10,7 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from rtshcua.ground.agent.specification_schema import DRAFT, FORMAT, RESERVED, VERSION, OverridesShape
-from rtshcua.ground.agent.value_patterns import COORDINATES, name_but, quantities, unit_of, whole, written
+from rtshcua.ground.agent.value_patterns import (
+    COORDINATES,
+    DURATION,
+    SHARE,
+    name_but,
+    quantities,
+    unit_of,
+    whole,
+    written,
+)
 from rtshcua.ground.checker.checks.contracts import RECORDS
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.model.flat.contract import CHOICE, PLACE, QUANTITY, ZONE, Contract, MotionKind, Parameter, SourceKind
@@ -262,7 +271,7 @@ def _step(skill: PermittedSkill, defaults: frozenset[tuple[str, str]]) -> Schema
 
 def _overrides() -> Schema:
     """The schema of a step's overrides. The compiler checks that they are tighter, and their conditions."""
-    duration = {"type": "string", "pattern": r"^[1-9][0-9]{0,4} (?:ms|s|min)$"}
+    duration = {"type": "string", "pattern": DURATION}
     names = {"type": "array", "items": {"type": "string", "pattern": name_but(RESERVED)}}
     kinds = {"type": "array", "items": {"type": "string", "enum": list(RECORDS)}}
     own: Schema = {
@@ -271,7 +280,7 @@ def _overrides() -> Schema:
         if name in ("require", "assume", "maintain")
     }
     times = ("deadline", "valid_for", "lasts_at_most", "grace")
-    energy = {"type": "string", "pattern": r"^[1-9][0-9]? %$"}
+    energy = {"type": "string", "pattern": SHARE}
     fields = dict.fromkeys(times, duration) | own | {"energy_at_most": energy, "during": names, "record": kinds}
     return _object(fields, optional=tuple(fields))
 

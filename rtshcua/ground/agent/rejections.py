@@ -6,6 +6,7 @@ from a fix or the help of the error.
 
 import json
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from typing import Any, Final, NamedTuple
@@ -13,18 +14,22 @@ from typing import Any, Final, NamedTuple
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
-from rtshcua.diagnostics.suggest import nearest
+from rtshcua.diagnostics.suggest import likeness, nearest
 from rtshcua.ground.agent.json_tree import pointer as pointer_to
+from rtshcua.ground.agent.json_tree import read_json_text
 from rtshcua.ground.agent.narrowed_schema import PermittedSkill
-from rtshcua.ground.agent.quantity_reading import decimal, read_quantity
+from rtshcua.ground.agent.quantity_reading import PLACE_FORM, decimal, quantity_text, read_place, read_quantity
 from rtshcua.ground.agent.specification_schema import uncounted_findings
-from rtshcua.ground.agent.value_patterns import written
+from rtshcua.ground.agent.value_patterns import COORDINATES, DURATION, SHARE, unit_of, written
 from rtshcua.model.flat.contract import QUANTITY
-from rtshcua.model.quantity import Dimension
+from rtshcua.model.quantity import UNITS, Dimension
 
 #: the limit of a value that must be removed
 ABSENT: Final[Mapping[str, Any]] = {"absent": True}
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
+_NO_LETTER = re.compile(r"[\W_]+")
+#: quantities without a range in the schema, by their pattern
+_UNRANGED: Final = {DURATION: Dimension.DURATION, SHARE: Dimension.RATIO}
 _MOST = 40
 #: the most misfits of each kind that are matched with errors, which bounds the work
 _MOST_MISFITS = 1_000
@@ -33,8 +38,13 @@ _ARTICLED = {
     "object": "an object", "array": "a list", "string": "a text", "boolean": "true or false",
     "integer": "a whole number",
 }  # fmt: skip
-#: the longest string, in characters, that is tried as JSON
-_MOST_JSON = 65_536
+_NOTHING: Final = object()
+#: how a text with JSON, or with marks for code around it, begins
+_JSON: Final = ("[", "{", "`")
+#: the longest name that is compared with the known ones, in characters
+_MOST_NAME = 200
+#: the longest text, in characters, that is tried as JSON, and whose error is looked for: a proposal may have many
+_MOST_JSON, _MOST_EXPLAINED = 65_536, 4_096
 
 
 class PermittedRange(NamedTuple):
@@ -116,7 +126,7 @@ def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[Sch
     for misfit in about:
         yield _rejection(found, misfit.pointer, value, misfit.limit, misfit.near, misfit.why)
     if not about:
-        near = _fixed(found, source)
+        near = _fixed(found, source, _raw(value, pointer))
         yield _rejection(found, pointer, value, None if near is None else {"one_of": [near]}, near)
 
 
@@ -161,31 +171,46 @@ def _repair(pointer: str, limit: Mapping[str, Any], near: Any, why: str) -> str:
         return (f"{why}; " if why else "") + f"permitted at `{pointer}`: from {limit['least']} to {limit['most']}"
     if accepted:
         listed = ", ".join(json.dumps(each, ensure_ascii=False) for each in accepted)
-        return f"accepted at `{pointer}`: {listed}" + ("" if "one_of" in limit else ", or coordinates in degrees")
+        return (
+            (f"{why}; " if why else "")
+            + f"accepted at `{pointer}`: {listed}"
+            + ("" if "one_of" in limit else f", or {PLACE_FORM}")
+        )
     return why
 
 
-def _at(value: Any, pointer: str) -> tuple[bool, Any]:
-    """Return whether there is a value at a pointer, and the value; of an object or array only its size."""
+def _raw(value: Any, pointer: str) -> Any:
+    """Return the value at a pointer, or `_NOTHING`."""
     for part in pointer.split("/")[1:]:
         key = part.replace("~1", "/").replace("~0", "~")
         try:
             value = value[int(key)] if isinstance(value, list) else value[key]
         except (KeyError, IndexError, ValueError, TypeError):
-            return False, None
+            return _NOTHING
+    return value
+
+
+def _at(value: Any, pointer: str) -> tuple[bool, Any]:
+    """Return whether there is a value at a pointer, and the value; of an object or array only its size."""
+    value = _raw(value, pointer)
     if isinstance(value, dict | list):
         return True, f"{_NAMES[type(value)]} of {len(value)}"
-    return True, value[:200] if isinstance(value, str) else value
+    return value is not _NOTHING, value[:200] if isinstance(value, str) else value
 
 
-def _fixed(found: Diagnostic, source: Source) -> Any:
-    """The JSON value that the first fix writes; None if the fix does not write a whole value."""
+def _fixed(found: Diagnostic, source: Source, value: Any) -> Any:
+    """What the first fix makes of `value`, a string or number; None if the fix changes anything else."""
+    if not isinstance(value, str | int):
+        return None
+    text = json.dumps(value, ensure_ascii=False)
     for fix in found.fixes:
-        if fix.span.file == source.file:
+        start, end = fix.span.start, fix.span.end
+        at = source.text.find(text, max(0, start - len(text)), end + len(text))
+        if fix.span.file == source.file and 0 <= at <= start and end <= at + len(text):
             try:
-                return json.loads(fix.replacement)
+                return json.loads(text[: start - at] + fix.replacement + text[end - at :])
             except ValueError:
-                return fix.replacement if source.text[fix.span.start - 1 : fix.span.start] == '"' else None
+                return None
     return None
 
 
@@ -268,18 +293,7 @@ class _SchemaFit:
         if named in self._defs:
             yield from self.misfits(self._defs[named], value, at, (named, ""))
             return
-        near = nearest(named, self._defs)
-        yield SchemaMisfit(f"{at}/skill", {"one_of": list(self._defs)}, near or self._alike(_arguments(value) or {}))
-
-    def _alike(self, arguments: Mapping[str, Any]) -> str:
-        """The skill whose parameters are most like these arguments."""
-        named = frozenset(arguments)
-
-        def differs(skill: str) -> int:
-            own = self._defs[skill]["properties"]["arguments"]
-            return len(named - set(own["properties"])) * 2 + len(set(own["required"]) - named)
-
-        return min(self._defs, key=differs)
+        yield SchemaMisfit(f"{at}/skill", {"one_of": list(self._defs)}, _choice(named, list(self._defs))[0])
 
     def _object(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[SchemaMisfit]:
         skill, _ = of
@@ -307,20 +321,49 @@ class _SchemaFit:
     def _near(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
         """Return the accepted value nearest to `value` (None if none is near) and why `value` is not accepted."""
         choices, span, kind = _choices(schema), self._frame.ranges.get(of), schema.get("type")
-        if choices is not None and len(choices) == 1:
-            return choices[0], ""
         if choices is not None:
-            return nearest(value, choices) if isinstance(value, str) else None, ""
+            return (choices[0], "") if "const" in schema else _choice(value, choices)
         if span is not None:
-            return _clamped(value, span)
+            return nearest_quantity(value, span)
         if kind in ("object", "array"):
-            inner = _unquoted(value)
-            if _NAMES.get(type(inner)) == kind:
-                return inner, f"write the {'list' if kind == 'array' else 'object'} itself, not a string with JSON,"
-        if kind == "object":
-            made = {name: self._near(schema["properties"][name], None, (of[0], name))[0] for name in schema["required"]}
-            return None if any(each is None for each in made.values()) else made, ""
-        return _name(schema, value) if kind == "string" else None, ""
+            return self._near_container(schema, value, of)
+        if schema.get("pattern") in _UNRANGED:
+            return _unranged(value, schema)
+        if COORDINATES in schema.get("pattern", ""):
+            return _place(value, _places(schema))
+        return _name(schema, value) if kind == "string" else (None, "")
+
+    def _near_container(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
+        """Return the object or list that `value` means, perhaps as text."""
+        kind = schema["type"]
+        inner, why = _json_in(value)
+        if _NAMES.get(type(inner)) == kind:
+            return inner, f"write the {'list' if kind == 'array' else 'object'} itself, not a string with JSON,"
+        if why:
+            return None, why
+        return self._near_list(schema, value, of) if kind == "array" else self._near_object(schema, value, of)
+
+    def _near_list(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
+        """Return the list of a value that is accepted in it."""
+        if value is None or schema.get("maxItems", 1) == 0:
+            return None, ""
+        fits = next(self.misfits(schema["items"], value, "", of), None) is None
+        return ([value], "write a list, even of one value,") if fits else (None, "")
+
+    def _near_object(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
+        """Return the only accepted object, or None, and its keys."""
+        made = {name: self._near(schema["properties"][name], None, (of[0], name))[0] for name in schema["required"]}
+        if (made or value is None) and all(each is not None for each in made.values()):
+            return made, ""
+        keys = ", ".join(f"`{name}`" for name in made or schema["properties"])
+        return None, f"expected an object with {keys}" if keys else "expected an empty object"
+
+
+def _json_in(value: Any) -> tuple[Any, str]:
+    """Return the JSON value that a text holds, or None, and what is wrong with it; both empty if it is no such text."""
+    if isinstance(value, str) and len(value) <= _MOST_JSON and value.lstrip().startswith(_JSON):
+        return read_json_text(value, explained=len(value) <= _MOST_EXPLAINED)
+    return None, ""
 
 
 def _skill(step: Any) -> str:
@@ -350,25 +393,65 @@ def _fits(schema: Mapping[str, Any], value: Any) -> bool:
     return not long and ("pattern" not in schema or re.fullmatch(schema["pattern"], value) is not None)
 
 
-def _clamped(value: Any, span: PermittedRange) -> tuple[str | None, str]:
-    """Return the quantity in a string or number, moved into the range, in the language's form; and what was wrong."""
-    if isinstance(value, bool) or not isinstance(value, str | int | float):
-        return None, ""
-    found, why = read_quantity(str(value), span.dimension)
+def nearest_quantity(value: Any, span: PermittedRange) -> tuple[str | None, str]:
+    """Return the meant quantity in the language's form, or the end of the range that is nearest to it; None if it is
+    unclear. And what was wrong.
+    """
+    text = quantity_text(value)
+    found, why = (None, "") if text is None else read_quantity(text, span.dimension)
     if found is None:
         return None, why
-    near = min(max(round(found), span.low), span.high)
-    if near != round(found) and why:
+    if why and not span.low <= found <= span.high:
         why = f"the value is {decimal(found, span.dimension)}, out of range"
-    return written(near, span.dimension), why
+    elif why and found.denominator != 1:
+        why += ", rounded"
+    return written(min(max(round(found), span.low), span.high), span.dimension), why
 
 
-def _unquoted(value: Any) -> Any:
-    """Return the JSON value in a string; None if it holds none."""
-    try:
-        return json.loads(value) if isinstance(value, str) and len(value) <= _MOST_JSON else None
-    except (ValueError, RecursionError):
-        return None
+def _unranged(value: Any, schema: Mapping[str, Any]) -> tuple[str | None, str]:
+    """Return the quantity in a string or number in the language's form; None if the language accepts it, because then
+    the error is another one.
+    """
+    dimension, text = _UNRANGED[schema["pattern"]], quantity_text(value)
+    if text is None:
+        return None, f"expected a text such as `{written(2 * UNITS[unit_of(dimension)].numerator, dimension)}`"
+    found, why = read_quantity(text, dimension)
+    if found is None or not why:
+        return None, why
+    forms = [written(round(found), dimension)]
+    if dimension is Dimension.DURATION:
+        forms.append(f"{round(found * UNITS['ms'].denominator / UNITS['ms'].numerator)} ms")
+    return next((each for each in forms if _fits(schema, each)), None), why
+
+
+def _choice(value: Any, choices: list[Any]) -> tuple[Any, str]:
+    """Return the choice that a text means, or the nearest one if no other is as near; the only one for no value."""
+    if value is None and len(choices) == 1:
+        return choices[0], ""
+    if not isinstance(value, str) or len(value) > _MOST_NAME:
+        return None, ""
+    same = [each for each in choices if _letters(each) == _letters(value)]
+    if len(same) == 1:
+        return same[0], ""
+    near = nearest(value, choices)
+    if near is None:
+        return None, ""
+    own, others = _letters(value), [each for each in choices if each != near]
+    best = likeness(own, _letters(near))
+    return (near if all(likeness(own, _letters(each)) < best for each in others) else None), ""
+
+
+def _letters(name: str) -> str:
+    """The letters and digits of a name, without case."""
+    return _NO_LETTER.sub("", unicodedata.normalize("NFKC", name).casefold())
+
+
+def _place(value: Any, places: list[str]) -> tuple[str | None, str]:
+    """Return coordinates in the language's form, or the place that a text means, and what was wrong."""
+    found, why = read_place(value)
+    if found is None and not why:
+        return _choice(value, places)[0], "" if places else PLACE_FORM
+    return found, why
 
 
 def _places(schema: Mapping[str, Any]) -> list[str]:
@@ -376,13 +459,12 @@ def _places(schema: Mapping[str, Any]) -> list[str]:
     return [each.replace("\\", "") for each in re.findall(r"\w+\\\.entry", schema.get("pattern", ""))]
 
 
-def _name(schema: Mapping[str, Any], value: Any) -> str | None:
-    """Return a name made from `value` that fits the schema, or the place whose name is nearest to it."""
-    words: str = (value if isinstance(value, str) else "")[: schema.get("maxLength", 200)]
-    places = _places(schema)
-    if places:
-        return nearest(words, places)
-    for text in (words, _NO_NAME.sub("_", words), f"m_{_NO_NAME.sub('_', words)}", "a"):
-        if _fits(schema, text):
-            return text
-    return None
+def _name(schema: Mapping[str, Any], value: Any) -> tuple[str | None, str]:
+    """Return a name made of the letters and digits of `value` that fits the schema; None if it has none."""
+    words = value[: schema.get("maxLength", _MOST_NAME)] if isinstance(value, str) else ""
+    parts = _NO_NAME.sub("_", words)
+    if parts.strip("_"):
+        for text in (words, parts, f"m_{parts}"):
+            if _fits(schema, text):
+                return text, ""
+    return None, "a name has letters, digits and `_`, and begins with a letter" if "pattern" in schema else ""

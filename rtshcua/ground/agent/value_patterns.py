@@ -14,6 +14,10 @@ COORDINATES: Final = (
     r"[0-8]?[0-9](?:\.[0-9]{1,7})? [NS], (?:1[0-7][0-9]|[0-9]?[0-9])(?:\.[0-9]{1,7})? [EW]"  # up to 89.9 and 179.9
 )
 
+#: a duration and a share of the charge in the overrides of a step, whose ranges depend on the skill's contract
+DURATION: Final = r"^[1-9][0-9]{0,4} (?:ms|s|min)$"
+SHARE: Final = r"^[1-9][0-9]? %$"
+
 
 def whole(*alternatives: str) -> str:
     """The pattern of a whole string that is one of the alternatives."""

@@ -18,9 +18,28 @@ from rtshcua.model.quantity import UNITS, Dimension, display
 MEANT = {
     "metre": "m", "metres": "m", "meter": "m", "meters": "m", "mps": "m/s", "kph": "km/h", "kmh": "km/h",
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "minute": "min", "minutes": "min", "mins": "min",
-    "hr": "h", "hour": "h", "hours": "h", "msec": "ms", "µs": "us", "usec": "us", "percent": "%", "pct": "%",
-    "degree": "deg", "degrees": "deg", "°": "deg",
+    "hr": "h", "hour": "h", "hours": "h", "msec": "ms", "\u03bcs": "us", "usec": "us", "percent": "%",
+    "per cent": "%", "pct": "%", "degree": "deg", "degrees": "deg", "°": "deg", "º": "deg", "volt": "V", "volts": "V",
+    "kilometer": "km", "kilometers": "km", "kilometre": "km", "kilometres": "km", "centimeter": "cm",
+    "centimeters": "cm", "centimetre": "cm", "centimetres": "cm", "millimeter": "mm", "millimeters": "mm",
+    "millimetre": "mm", "millimetres": "mm", "millisecond": "ms", "milliseconds": "ms", "microsecond": "us",
+    "microseconds": "us", "kmph": "km/h", "mph": "mi/h", "fps": "ft/s", "fpm": "ft/min",
 }  # fmt: skip
+
+_FOOT = Fraction(3_048, 10)  # mm, exact since 1959
+_NAUTICAL_MILE = Fraction(1_852_000)
+_RADIAN = Fraction(180 * 10_000_000) / Fraction("3.14159265358979323846")
+#: Common units that the language does not have: their dimension, and their size in its canonical unit. `nm` is none of
+#: them: it is a nautical mile to some and a nanometre to others.
+FOREIGN = {
+    **dict.fromkeys(("ft", "foot", "feet", "'"), (Dimension.LENGTH, _FOOT)),
+    **dict.fromkeys(("in", "inch", "inches", '"'), (Dimension.LENGTH, _FOOT / 12)),
+    **dict.fromkeys(("yd", "yard", "yards"), (Dimension.LENGTH, _FOOT * 3)),
+    **dict.fromkeys(("mi", "mile", "miles"), (Dimension.LENGTH, _FOOT * 5_280)),
+    **dict.fromkeys(("NM", "nmi", "nautical mile", "nautical miles"), (Dimension.LENGTH, _NAUTICAL_MILE)),
+    **dict.fromkeys(("kt", "kts", "kn", "knot", "knots"), (Dimension.SPEED, _NAUTICAL_MILE / 3_600)),
+    **dict.fromkeys(("rad", "radian", "radians"), (Dimension.ANGLE, _RADIAN)),
+}
 
 #: The largest onboard value of a dimension, if it is not `MAX_VALUE`.
 LARGEST = {
@@ -46,6 +65,7 @@ DIMENSION_OF = {
 #: The compass points after a latitude or a longitude, and their opposites.
 POINTS = {"N": "S", "S": "N", "E": "W", "W": "E"}
 
+_WRITTEN_NUMBER = re.compile(r"-? ?[0-9][0-9_]*(?:\.[0-9]+)?")
 _EXPONENT = re.compile(r"[eE][0-9]*")
 
 LOOK_BACK = 120  # characters before a number that are searched for such a keyword
@@ -99,9 +119,17 @@ def _unknown_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
     if unit in POINTS or _EXPONENT.fullmatch(unit):
         _no_unit(reader, unit, written, span)
         return
-    meant = MEANT.get(unit.casefold()) or (nearest(unit, UNITS) if len(unit) <= SHOWN else None)
+    folded, foreign = unit.casefold(), size_of(unit)
+    meant: str | None = MEANT.get(folded, folded)
+    if meant not in UNITS:
+        meant = nearest(unit, UNITS) if foreign is None and len(unit) <= SHOWN else None
+    number = _WRITTEN_NUMBER.match(written)
     fixes: tuple[Fix, ...] = ()
-    if meant:
+    if foreign is not None and meant is None and number is not None:
+        value = Fraction(number[0].replace("_", "").replace(" ", "")) * foreign[1]
+        about = "" if value.denominator == 1 else "about "
+        help = f"`{short(written)}` is {about}`{display(round(value), foreign[0])}`"
+    elif meant:
         help = f"did you mean `{meant}`?"
         fixes = (Fix(span, written.replace(unit, meant, 1), f"write `{meant}`"),)
     else:
@@ -109,6 +137,21 @@ def _unknown_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
         names = sorted(UNITS, key=lambda name: UNITS[name].dimension is not expected)
         help = "units are " + ", ".join(f"`{name}`" for name in names)
     reader.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit", span, help, fixes=fixes)
+
+
+def size_of(unit: str) -> tuple[Dimension, Fraction] | None:
+    """The dimension of a unit in any common spelling, and its size in the canonical unit; None if it is unknown."""
+    folded = unit.casefold()
+    for name in (unit, MEANT.get(folded, folded)):
+        if name in UNITS:
+            return UNITS[name].dimension, Fraction(UNITS[name].numerator, UNITS[name].denominator)
+        if name in FOREIGN:
+            return FOREIGN[name]
+    way, slash, time = MEANT.get(folded, folded).partition("/")
+    of_way, of_time = (size_of(way), size_of(time)) if slash and "/" not in time else (None, None)
+    if of_way is None or of_time is None or (of_way[0], of_time[0]) != (Dimension.LENGTH, Dimension.DURATION):
+        return None
+    return Dimension.SPEED, of_way[1] / of_time[1] * UNITS["s"].numerator
 
 
 def _not_exact(

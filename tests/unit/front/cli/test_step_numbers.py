@@ -120,7 +120,7 @@ def test_mission_for_agents_has_index_and_number(tmp_path: Path) -> None:
         steps = json.loads(agents._mission())["steps"]
     assert [(each["step"], each["step_number"]) for each in steps] == [(at, at + 1) for at in range(len(steps))]
     (tool,) = (each for each in TOOLS if each.name == "replan")
-    assert tool.inputSchema["properties"]["from_step_number"]["minimum"] == 1
+    assert tool.input_schema["properties"]["from_step_number"]["minimum"] == 1
 
 
 def test_an_event_of_a_run_has_both_and_its_text_the_number() -> None:

@@ -40,6 +40,7 @@ def desk(missions: Missions, tmp_path: Path) -> Tools:
     payload = policy_payload(missions.policy)
     envelope = cose.sign1(payload, key=POLICY, duty=Duty.POLICY, content_type=names.POLICY.content_type)
     following = Following(tmp_path / "none.sock")
+    following.await_first()  # its thread changes nothing after that
     following.end()
     signer = Signer(AGENT, envelope, policy_digest(payload), lambda policy, mission: None)
     return Tools(missions, signer, tmp_path / "none.sock", following)

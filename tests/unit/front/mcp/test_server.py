@@ -13,11 +13,11 @@ import mcp_types as types
 from mcp import Client
 from mcp_types.version import HANDSHAKE_PROTOCOL_VERSIONS, MODERN_PROTOCOL_VERSIONS
 
-from rtshcua.front.mcp.greeting import HANDSHAKE_VERSIONS, STATELESS_VERSIONS, Begun, answer_to, greet
+from rtshcua.front.mcp.greeting import HANDSHAKE_VERSIONS, STATELESS_VERSIONS, Greeted, answer_to, greet
 from rtshcua.front.mcp.server import Opening, made
 from rtshcua.front.mcp.stdio import streams
 from rtshcua.front.mcp.tools import Tools
-from unit.front.mcp.test_progress import LOW, awaited
+from unit.front.mcp.test_flight_progress import LOW, awaited
 from unit.front.mcp.test_stdio import pipes
 from unit.front.mcp.test_tools import flying, status
 
@@ -35,12 +35,12 @@ def served(tools: Any, mode: Any, work: Callable[[Client], Awaitable[None]], **o
     anyio.run(run)
 
 
-def answered(tools: Any, *requests: dict[str, Any], begun: Begun | None = None) -> list[dict[str, Any]]:
+def answered(tools: Any, *requests: dict[str, Any], begun: Greeted | None = None) -> list[dict[str, Any]]:
     """What the SDK answers to a host that sends these and ends; or to one that was greeted already."""
 
     async def run(ours_in: int, ours_out: int) -> None:
         async with (
-            streams(ours_in, ours_out, begun or Begun()) as (incoming, outgoing, leaving),
+            streams(ours_in, ours_out, begun or Greeted()) as (incoming, outgoing, leaving),
             anyio.create_task_group() as others,
         ):
             server = made(Opening(lambda: tools), others, leaving)
@@ -150,7 +150,7 @@ def test_the_versions_are_those_of_the_sdk() -> None:
     assert (HANDSHAKE_VERSIONS, STATELESS_VERSIONS) == (HANDSHAKE_PROTOCOL_VERSIONS, MODERN_PROTOCOL_VERSIONS)
 
 
-def greeted(said: bytes) -> tuple[Begun, bytes]:
+def greeted(said: bytes) -> tuple[Greeted, bytes]:
     with pipes() as (says, hears, ours_in, ours_out):
         os.write(says, said)
         os.close(says)

@@ -14,7 +14,7 @@ import anyio
 import mcp_types as types
 from mcp.shared.message import SessionMessage
 
-from rtshcua.front.mcp.greeting import Begun
+from rtshcua.front.mcp.greeting import Greeted
 from rtshcua.front.mcp.messages import ENDS, MOST_OCTETS
 from rtshcua.front.mcp.stdio import MOST_OPEN, Lines, streams
 
@@ -62,7 +62,7 @@ def served(said: bytes, *, answers: bool = True, reads: bool = True, more: Any =
     """The answers to a host that sends these lines and ends; requests get an empty answer, or none."""
 
     async def serve(ours_in: int, ours_out: int) -> None:
-        async with streams(ours_in, ours_out, Begun()) as (incoming, outgoing, _):
+        async with streams(ours_in, ours_out, Greeted()) as (incoming, outgoing, _):
             async for message in incoming:
                 root = message.message
                 if answers and isinstance(root, types.JSONRPCRequest):
@@ -111,7 +111,7 @@ def test_a_host_that_is_gone_ends_it() -> None:
 
 def test_a_host_that_ends_without_reading_ends_it() -> None:
     async def serve(ours_in: int, ours_out: int) -> None:
-        async with streams(ours_in, ours_out, Begun()) as (incoming, outgoing, _):
+        async with streams(ours_in, ours_out, Greeted()) as (incoming, outgoing, _):
             async for message in incoming:
                 answer = types.JSONRPCResponse(jsonrpc="2.0", id=message.message.id, result={"a": "x" * 200_000})
                 await outgoing.send(SessionMessage(answer))
@@ -124,7 +124,7 @@ def test_a_host_that_ends_without_reading_ends_it() -> None:
 
 def test_a_stream_that_cannot_be_read_or_written_is_an_error_of_its_own() -> None:
     async def serve(ours_in: int, ours_out: int) -> None:
-        async with streams(ours_in, ours_out, Begun()) as (incoming, _, _):
+        async with streams(ours_in, ours_out, Greeted()) as (incoming, _, _):
             async for _ in incoming:
                 pass
 

@@ -17,6 +17,7 @@ from rtshcua.front.mcp import tools as desks
 from rtshcua.front.mcp.flight import Following, understood
 from rtshcua.front.mcp.tools import Misused, Tools
 from rtshcua.ground.agent.specification import load_specification
+from rtshcua.onboard.calls import call
 from rtshcua.wire import cose, names
 from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import parse
@@ -151,6 +152,89 @@ def test_repeated_proposal_reports_the_flying_mission(desk: Tools, handed: list[
     assert len(handed) == 1
 
 
+def told_of(desk: Tools, missions: Missions, mission: Any) -> dict[str, Any]:
+    """The line of a flight about a mission that was proposed earlier, as `rtshcua run` writes it."""
+    answer = missions.check(mission, 1_000_000)
+    assert answer.policy is not None
+    assert answer.mission is not None
+    steps = [
+        {"step": each.step, "phase": answer.mission.phases[each.phase], "text": call(answer.policy, each)}
+        for each in answer.mission.invocations
+    ]
+    return {"type": "mission", "digest": (bytes([8]) * 32).hex(), "mission": answer.mission.name,
+            "policy_digest": desk._signer.digest.hex(), "steps": steps}  # fmt: skip
+
+
+SHORTER = deepcopy(PROPOSAL)
+SHORTER["phases"][1]["steps"].pop()
+
+
+def test_server_that_began_again_recognises_the_flying_mission(
+    desk: Tools, handed: list[bytes], missions: Missions
+) -> None:
+    flying(desk)
+    desk.following.mission = told_of(desk, missions, PROPOSAL)
+    found = desk.propose_mission(PROPOSAL, "one")
+    assert (found["accepted"], found["state"], found["code"]) == (True, "flying", "accepted")
+    assert "already flying" in found["text"]
+    assert status(desk, found["ticket"]) == "admitted"
+    assert desk.propose_mission(PROPOSAL, "one")["ticket"] == found["ticket"]
+    assert desk.propose_mission(PROPOSAL, "two")["state"] == "flying"
+    assert handed == []
+    replaced = desk.replan(SHORTER, 3, "three")
+    assert replaced["accepted"], "the flying mission is known again"
+    assert status(desk, replaced["ticket"]) == "admitted"
+    assert len(handed) == 1
+
+
+def test_server_that_began_again_recognises_a_flying_replacement(
+    desk: Tools, handed: list[bytes], missions: Missions
+) -> None:
+    flying(desk)
+    desk.following.mission = told_of(desk, missions, SHORTER)
+    with pytest.raises(Misused) as misused:
+        desk.replan(PROPOSAL, 3, "one")
+    assert misused.value.code == "not-flying"
+    assert desk.replan(SHORTER, 3, "two")["state"] == "flying"
+    assert handed == []
+    other = deepcopy(SHORTER)
+    other["phases"][1]["steps"][0]["on_inadmissible"] = "skip"
+    assert status(desk, desk.replan(other, 2, "three")["ticket"]) == "admitted", "overrides may change"
+    assert len(handed) == 1
+
+
+@pytest.mark.parametrize("key", ["mission", "policy_digest", "steps"])
+def test_mission_that_differs_in_what_the_vehicle_tells_is_handed_in(
+    desk: Tools, handed: list[bytes], missions: Missions, key: str
+) -> None:
+    flying(desk)
+    other = {"mission": "other", "policy_digest": "00" * 32, "steps": told_of(desk, missions, SHORTER)["steps"]}
+    desk.following.mission = told_of(desk, missions, PROPOSAL) | {key: other[key]}
+    assert status(desk, desk.propose_mission(PROPOSAL, "one")["ticket"]) == "admitted"
+    assert len(handed) == 1
+
+
+@pytest.mark.parametrize(("flown", "state", "code"), [(PROPOSAL, "admitted", "accepted"), (SHORTER, "refused", None)])
+def test_bundle_refused_by_a_flight_is_told_what_flies(
+    desk: Tools, missions: Missions, monkeypatch: pytest.MonkeyPatch, flown: Any, state: str, code: str | None
+) -> None:
+    """Another host proposed in the meantime; the flight calls a bundle malformed."""
+
+    def hand_in(socket: Path, document: bytes) -> tuple[str, str]:
+        flying(desk)
+        desk.following.mission = told_of(desk, missions, flown)
+        return "malformed", "not a signed envelope"
+
+    monkeypatch.setattr(desks, "hand_in", hand_in)
+    ticket = desk.propose_mission(PROPOSAL, "one")["ticket"]
+    assert status(desk, ticket) == state
+    shown = desk.mission_status(ticket)
+    assert shown["code"] == (code or "already-flying")
+    assert ("another mission is flying" in shown.get("text", "")) == (state == "refused")
+    if state == "admitted":
+        assert desk.propose_mission(PROPOSAL, "one")["state"] == "flying"
+
+
 def test_another_proposal_or_one_after_the_flight_is_handed_in(desk: Tools, handed: list[bytes]) -> None:
     first = desk.propose_mission(PROPOSAL, "one")
     assert status(desk, first["ticket"]) == "admitted"
@@ -223,7 +307,13 @@ LINES: dict[str, dict[str, Any]] = {
     "hello": {"type": "hello", "vehicle": "quad-07", "flight": "07" * 16, "mode": "software"},
     "waiting": {"type": "waiting", "policy": "p@1"},
     "vehicle": {"type": "vehicle", "ready": True, "unready": None, "armed": False, "airborne": False, "signals": []},
-    "mission": {"type": "mission", "digest": "08" * 32},
+    "mission": {
+        "type": "mission",
+        "digest": "08" * 32,
+        "mission": "proposal",
+        "policy_digest": "06" * 32,
+        "steps": [{"phase": "departure", "text": "takeoff(altitude = 25 m)"}],
+    },
     "decision": RECORDED | {"binding": "09" * 32, "invocation": "0a" * 16, "state": {"values": [0], "ages": [0]}},
     "effect": {"type": "effect", "seq": 8, "event": "replan", "step": 1, "detail": "within 5 ms", "token": -1},
     "seal": {"type": "seal", "seq": 9},

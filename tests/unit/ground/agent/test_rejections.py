@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from rtshcua.app.propose import Missions
+from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 PROPOSAL = json.loads((CHECKOUT / "missions/proposal.json").read_text("utf-8"))
@@ -73,10 +74,22 @@ def mutated(chance: random.Random) -> Any:
     return value
 
 
-def chosen(limit: dict[str, Any]) -> Any:
-    """A value that an agent might choose if the rejection names no nearest one."""
-    some = limit.get("one_of") or limit.get("places") or [limit.get("least")]
-    return {"object": {}, "array": []}.get(limit.get("type", ""), some[0])
+def chosen(limit: dict[str, Any], pointer: str) -> Any:
+    """A value that an agent might choose if the rejection names no nearest one: what it meant, if that is accepted."""
+    some = limit.get("one_of") or limit.get("places") or [limit.get("least", "a_name" if "pattern" in limit else None)]
+    near = next((each for each in some if each == meant(pointer)), some[0])
+    return {"object": {}, "array": []}.get(limit.get("type", ""), near)
+
+
+def meant(pointer: str) -> Any:
+    """The value of the proposal at a place."""
+    value: Any = PROPOSAL
+    for part in pointer.split("/")[1:]:
+        try:
+            value = value[int(part) if isinstance(value, list) else part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return value
 
 
 def repair(value: Any, rejected: list[dict[str, Any]]) -> None:
@@ -93,7 +106,7 @@ def repair(value: Any, rejected: list[dict[str, Any]]) -> None:
             elif each["nearest"] is not None:
                 of[key] = each["nearest"]
             else:
-                of[key] = chosen(each["limit"] or {})
+                of[key] = chosen(each["limit"] or {}, each["field"])
         except (KeyError, IndexError, TypeError):
             continue  # an earlier correction removed or replaced the enclosing value
 
@@ -162,7 +175,8 @@ ALTITUDES = (
     ("\uff12\uff15 m", "25 m", "same value"), ("25 \uff4d", "25 m", "same value"), ("25,0 m", "25 m", "same value"),
     ("2.5e1 m", "25 m", "same value"), ("\u0662\u0665 m", "25 m", "same value"),
     ("25 m relative", "25 m", "same value"),
-    ("25", "25 m", "the value in metres"), (25, "25 m", "the value in metres"), (25.5, "25.5 m", "the value in metres"),
+    ("25", None, "if it is in metres, write `25 m`"), (25, None, "write `25 m`"), (25.5, None, "write `25.5 m`"),
+    ({"value": 25, "unit": "m"}, "25 m", ""), ('"25 m"', "25 m", "same value"), ("25\u200bm", "25 m", "same value"),
     ("4000 m", "40 m", ""), ("\u221225 m", "3 m", "-25 m, out of range"), ("200 ft", "40 m", "60.96 m, out of range"),
     ("25 m AGL", None, "above ground"), ("25 m AMSL", None, "above sea"), ("25 m/s", None, "unit of speed"),
     ("9 s", None, "unit of duration"), ("25 kt", None, "unit of speed"), ("25 furlongs", None, "`furlongs`"),
@@ -187,11 +201,69 @@ def test_advice_gives_the_same_value_in_accepted_form_or_none(
         assert rejected(missions, ALTITUDE, same) == {}
 
 
+STEP = "/phases/1/steps/1"
+#: a place, a value that is not accepted there, the nearest accepted one or None, and a part of the repair
+OTHERS_THAN_ALTITUDES: tuple[tuple[str, Any, Any, str], ...] = (
+    ("/version", "1", 1, "write 1"), ("/policy/version", "7", 7, "write 7"), ("/policy/version", 7.0, 7, "write 7"),
+    ("/vehicle", "Quad", "quad", ""),
+    (f"{STEP}/skill", "Inspect-Area", "inspect_area", ""), (f"{STEP}/skill", "inspect area", "inspect_area", ""),
+    (f"{STEP}/skill", "track_target", None, "accepted at"),
+    ("/proposed_by", "agent", None, "expected an object with `source`, `name`, `role`"),
+    ("/phases/2/steps", '[{"skill": "return_home"}] and land', None, "line 1, column 28 of the JSON: expected the end"),
+    ("/phases/2/steps", '```json\n[{"skill": "return_home"}]\n```', [{"skill": "return_home"}], "the list itself"),
+    (f"{STEP}/arguments/area", "Bridge B", "bridge_b", ""), (f"{STEP}/arguments/area", "BRIDGE-B", "bridge_b", ""),
+    (f"{STEP}/arguments/area", "bridge_c", None, 'accepted at `/phases/1/steps/1/arguments/area`: "bridge_a"'),
+    (f"{STEP}/arguments/area", "city", None, "accepted at"), (f"{STEP}/arguments/area", None, None, "accepted at"),
+    (f"{STEP}/on_inadmissible", "Skip", "skip", ""), (f"{STEP}/on_inadmissible", "x", None, '"abort", "hold"'),
+    ("/phases/1/steps/0/arguments/target", "Bridge B entry", "bridge_b.entry", ""),
+    ("/phases/1/steps/0/arguments/target", "47.39927N 8.54572E", "47.39927 N, 8.54572 E", "same value"),
+    ("/phases/1/steps/0/arguments/target", {"lat": 47.39927, "lon": 8.54572}, "47.39927 N, 8.54572 E", ""),
+    ("/phases/1/steps/0/arguments/target", "47.39927, 8.54572", None, "if it is the first one, write `47.39927 N"),
+    ("/phases/2/steps/0/arguments", ["25 m"], None, "expected an empty object"),
+    (f"{STEP}/arguments", "25 m", None, "expected an object with `area`"),
+    (f"{STEP}/arguments", '{"area": "bridge_b"}', {"area": "bridge_b"}, "the object itself"),
+    (f"{STEP}/overrides", {"deadline": "2 seconds"}, "2 s", ""),
+    (f"{STEP}/overrides", {"deadline": "0.5 seconds"}, "500 ms", ""),
+    (f"{STEP}/overrides", {"deadline": "2"}, None, "if it is in seconds, write `2 s`"),
+    (f"{STEP}/overrides", {"deadline": 2}, None, "if it is in seconds, write `2 s`"),
+    (f"{STEP}/overrides", {"energy_at_most": "13 percent"}, "13 %", ""),
+    (f"{STEP}/overrides", {"energy_at_most": "thirteen"}, None, "such as `20 %`"),
+    (f"{STEP}/overrides", {"during": "inspection"}, ["inspection"], "a list, even of one value"),
+    (f"{STEP}/overrides", {"require": "battery > 50 %"}, ["battery > 50 %"], "a list, even of one value"),
+    (f"{STEP}/overrides", {"require": '["battery > 50 %"]'}, ["battery > 50 %"], "the list itself"),
+    (f"{STEP}/overrides", {"require": '["battery > 50 %'}, None, ""),
+    ("/imports", PROPOSAL["imports"][0], PROPOSAL["imports"], "a list, even of one value"),
+    ("/phases/2/steps", PROPOSAL["phases"][2]["steps"][0], PROPOSAL["phases"][2]["steps"], "a list, even of one"),
+    ("/name", None, None, "a name has letters"), ("/name", "", None, "a name has letters"), ("/name", 7, None, ""),
+    ("/name", "fly me home", "fly_me_home", ""), ("/intent", 7, None, ""),
+)  # fmt: skip
+
+
+@rows("pointer, given, near, repair", OTHERS_THAN_ALTITUDES)
+def test_advice_is_what_was_meant_or_the_accepted_form(
+    missions: Missions, pointer: str, given: Any, near: Any, repair: str
+) -> None:
+    value, path = deepcopy(PROPOSAL), [int(part) if part.isdigit() else part for part in pointer.split("/")[1:]]
+    holder(value, tuple(path))[path[-1]] = given
+    if pointer.endswith("/overrides"):
+        pointer += f"/{next(iter(given))}"
+    (found,) = [each for each in missions.check(value, 0).rejections if each["field"] == pointer]
+    assert found["nearest"] == near
+    assert repair in found["repair"]
+    assert found["repair"]
+
+
+def test_advice_for_a_part_of_a_condition_is_the_whole_condition(missions: Missions) -> None:
+    """Regression: it was the replaced part alone."""
+    value = deepcopy(PROPOSAL)
+    value["phases"][1]["steps"][1]["overrides"] = {"require": ["50 percent < battery"]}
+    (found,) = missions.check(value, 0).rejections
+    assert found["nearest"] == "50 % < battery"
+
+
 @pytest.mark.parametrize("pointer", ["/phases", "/phases/0/steps", "/imports"])
 def test_advice_for_a_list_in_a_string_is_the_list(missions: Missions, pointer: str) -> None:
-    wanted: Any = PROPOSAL
-    for part in pointer.split("/")[1:]:
-        wanted = wanted[int(part) if part.isdigit() else part]
+    wanted = meant(pointer)
     found = rejected(missions, pointer, json.dumps(wanted))
     assert found["nearest"] == wanted
     assert "the list itself, not a string" in found["repair"]

@@ -8,7 +8,7 @@ import pytest
 
 from rtshcua.app.propose import Missions
 from rtshcua.front.mcp.flight import understood
-from rtshcua.front.mcp.progress import (
+from rtshcua.front.mcp.flight_progress import (
     MOST_CHARACTERS,
     TELLING,
     Followed,

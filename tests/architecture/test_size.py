@@ -11,7 +11,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 910,  # rises with each subject: last cameras, surveys, formats of others, the greeting and progress for agents
+    "modules": 910,  # rises with each subject: last cameras, surveys, formats of others, two for hosts of agents
     "code lines": 113_000,  # to the thousand; rises with each feature: last cameras, surveys, imports, late emulators
     "shared class names": 0,
     "of them across packages": 0,

@@ -17,6 +17,7 @@ import pytest
 CHECKOUT = Path(__file__).resolve().parents[2]
 #: by benchmark, what of it is made smaller; `_` are its words on the command line
 SAMPLES: dict[str, dict[str, Any]] = {
+    "agent_host": {"ROUNDS": 1, "CALLS": 2, "THINKS_S": 0.1},
     "analysis": {"SIZES": (20, 40), "ROUNDS": 1},
     "archive": {"VEHICLES": 2, "FLIGHTS": 3, "EACH": 20, "MISSING": (0, 1), "CHANGED": (1, 1)},
     "boundary": {"ROUNDS": 1, "BATCHES": 1, "CALLS": 2, "TURNS": 1},

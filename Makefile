@@ -21,8 +21,8 @@ setup: ## make .venv and the boundary in C, or bring them up to date
 	@.make/setup
 	@.make/boundary
 
-demo: setup ## compile a mission, sign it, fly it on the simulated vehicle, verify its log
-	@$(BIN)/python .make/demo
+demo: setup ## refuse four proposals, fly one on the simulated vehicle, verify its log and draw it as a page
+	@$(BIN)/rtshcua demo --folder build/demo
 
 test: setup ## run the tests; decision, wire and evidence covered in full
 	$(BIN)/pytest -n $(JOBS) --cov --cov-report term

@@ -132,3 +132,10 @@ def test_flight_with_the_boundary_of_the_wheel(run: Run, library: Path, place: P
     run("rtshcua", "run", bundle, "--mode", "process", "--speed", "10", "--runs", runs)
     (folder,) = runs.iterdir()
     run("rtshcua", "verify-log", "--audit", folder)
+
+
+def test_demo_of_the_wheel(run: Run, place: Path) -> None:
+    """As `pipx run rtshcua demo` and `uvx rtshcua demo` run it."""
+    told = run("rtshcua", "demo").stdout
+    assert "VERIFIED" in told
+    assert (place / "rtshcua-demo/flight.html").is_file()

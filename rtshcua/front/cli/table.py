@@ -70,6 +70,7 @@ COMMANDS = (
     Row("init", "write", "create a project with a policy, a mission, tests and CI", ends_in_order=True),
     Row("lsp", "write", "run the language server for editors"),
     Row("completion", "write", "print a completion script for bash, zsh or fish"),
+    Row("demo", "fly", "see four refusals and one flight of the simulated vehicle, in a minute", ends_in_order=True),
     Row("keys", "fly", "create, list, replace and revoke keys, and manage the trust root", ends_in_order=True),
     Row("run", "fly", "fly a bundle on the simulated vehicle, or with --connect on yours"),
     Row("approve", "fly", "approve or refuse a step that requires confirmation", ends_in_order=True),

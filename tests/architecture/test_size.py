@@ -11,7 +11,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 908,  # rises with each subject: last cameras, survey geometry and the formats of others
+    "modules": 912,  # rises with each subject: last approvers, cameras and the formats of others
     "code lines": 113_000,  # to the thousand; rises with each feature: last cameras, surveys, imports, late emulators
     "shared class names": 0,
     "of them across packages": 0,

@@ -41,7 +41,7 @@ def bundle_in_flight(
     A document that only `stops` a flight can be signed also if a key of the bundle was revoked or has expired since the
     flight began, because it flies on under the earlier root. Raises `Untrusted` and OSError.
     """
-    trusted = _root(root, now_us)
+    trusted = trusted_root(root, now_us)
     data = read_bundle(bundle)
     try:
         found = open_bundle(data, root=trusted, vehicle=None, now_us=now_us)
@@ -49,10 +49,19 @@ def bundle_in_flight(
         if not stops or error.slug not in (REVOKED, *LAPSED):
             raise
         found = _of_before(data, trusted if root is not None else None, error)
+    documents = [read_regular(path, MAX_DOCUMENT) for path in replacements]
+    return with_replacements(found, documents, trusted, now_us, stops=stops)
+
+
+def with_replacements(
+    found: Bundle, documents: Sequence[bytes], trusted: TrustRoot, now_us: int, *, stops: bool = False
+) -> Bundle:
+    """The verified bundle after replacements that came into force, in order, which are verified here. Unless a document
+    only `stops` the flight, each mission is one that the vehicle accepts. Raises `Untrusted`.
+    """
     vehicle, now = found.policy.vehicle.identity, Now(0, now_us, 0)
     missions = [found.mission]
-    for path in replacements:
-        document = read_regular(path, MAX_DOCUMENT)
+    for document in documents:
         newer = open_replacement(document, root=trusted, vehicle=vehicle, flight=None, bundle=found, now=now)
         found = fit_replacement(newer, found, released=0)
         missions.append(newer.mission)
@@ -97,7 +106,7 @@ def flight_id(flight: str | None, to: Path | None) -> bytes | None:
     return None if place is None else flight_at(place)
 
 
-def _root(path: Path | None, now_us: int) -> TrustRoot:
+def trusted_root(path: Path | None, now_us: int) -> TrustRoot:
     """The key store's root, or the named one, which the user trusts by naming it."""
     signed = KeyStore(data_folder()).root() if path is None else read_root(path)
     return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)

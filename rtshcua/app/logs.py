@@ -1,6 +1,6 @@
 """Find logs, the exit codes of their verification, and the duration of their flights."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -9,7 +9,8 @@ from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG, lines_below, logs_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
-from rtshcua.evidence.reading import read
+from rtshcua.evidence.reading import LONGEST, read
+from rtshcua.evidence.records import Genesis
 from rtshcua.evidence.report import LogReport, LogVerdict
 
 _MARK = b'"format":"rtshcua/log"'
@@ -86,6 +87,22 @@ def is_log(path: Path) -> bool:
     with open_regular(path) as file:
         line = file.readline(_HEAD)
     return not line or line.startswith(START) or _MARK in line
+
+
+def log_below(runs: Path, flight: bytes) -> Path | None:
+    """The log of a flight, by its id, sought below `runs`. Raises OSError."""
+    return next((log for log in _latest_first(runs) if _flight_of(log) == flight.hex()), None)
+
+
+def _latest_first(runs: Path) -> Iterator[Path]:
+    if runs.is_dir():
+        yield from sorted((log for log in logs_of(runs) if log.is_file()), reverse=True)
+
+
+def _flight_of(log: Path) -> str | None:
+    with open_regular(log) as file:
+        record = read(file.readline(LONGEST))
+    return record.boot if isinstance(record, Genesis) else None
 
 
 def report_code(report: LogReport) -> ExitCode:

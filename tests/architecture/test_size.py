@@ -11,8 +11,8 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 910,  # rises with each subject: last cameras, surveys, formats of others, two for hosts of agents
-    "code lines": 113_000,  # to the thousand; rises with each feature: last cameras, surveys, imports, late emulators
+    "modules": 916,  # rises with each subject: last surveys, formats of others, hosts of agents, approvers, a demo
+    "code lines": 114_000,  # to the thousand; rises with each feature: last repairs for agents, approvers, a demo
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 69,

@@ -2,20 +2,16 @@
 
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from stat import S_ISSOCK
 
 from rtshcua.adapters.agent_socket import FlightFollower
-from rtshcua.adapters.store.reading import open_regular
-from rtshcua.adapters.store.runs import LOG, logs_of
+from rtshcua.adapters.store.runs import LOG
 from rtshcua.app.documents import no_log
 from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, flight_report
-from rtshcua.app.logs import NO_LOG_HELP, is_log
+from rtshcua.app.logs import NO_LOG_HELP, is_log, log_below
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.reading import LONGEST, read
-from rtshcua.evidence.records import Genesis
 from rtshcua.ground.flight.flight_content import FlightReport
 from rtshcua.ground.flight.flight_page import page, refused_page
 
@@ -29,23 +25,12 @@ def log_of_flight(given: Path, runs: Path) -> Path | Refusal:
         return log
     follower = FlightFollower(given)
     follower.close()
-    for log in _latest_first(runs):
-        if _flight_of(log) == follower.flight.hex():
-            return log
+    found = log_below(runs, follower.flight)
+    if found is not None:
+        return found
     help = "name the folder of its runs with `--runs`, or the run folder itself in place of the socket"
     text = f"no log of the flight {follower.flight.hex()} is below `{runs}`"
     return Refusal("input", text, help, code=ExitCode.INPUT)
-
-
-def _latest_first(runs: Path) -> Iterator[Path]:
-    if runs.is_dir():
-        yield from sorted((log for log in logs_of(runs) if log.is_file()), reverse=True)
-
-
-def _flight_of(log: Path) -> str | None:
-    with open_regular(log) as file:
-        record = read(file.readline(LONGEST))
-    return record.boot if isinstance(record, Genesis) else None
 
 
 class WatchedPage:

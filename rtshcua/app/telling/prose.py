@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, degrees, isqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.outline import rings as outline
@@ -60,13 +60,30 @@ def step(policy: Policy, one: Invocation) -> str:
     way from home, places by their way from home. Who signed the mission chose the path in a zone: how far it leads is
     told too.
     """
+    parts = step_parts(policy, one)
+    told = (f"{name} = {value}{f' [{where}]' if where else ''}" for name, value, where in parts.arguments)
+    return f"{parts.skill}({', '.join(told)}){f' {parts.path}' if parts.path else ''}"
+
+
+class StepParts(NamedTuple):
+    """A step in words: its skill; the name, value and place of each argument as it is bound (empty: it is no place);
+    and how far its path in a zone leads.
+    """
+
+    skill: str
+    arguments: tuple[tuple[str, str, str], ...]
+    path: str
+
+
+def step_parts(policy: Policy, one: Invocation) -> StepParts:
+    """The parts of `step`."""
     contract = policy.contracts[one.skill]
-    told = []
-    for each in contract.parameters:
-        where = _where(policy, each, one.arguments)
-        told.append(f"{each.name} = {argument(policy, each, one.arguments)}{f' [{where}]' if where else ''}")
-    covers = f" along {_path(one.plan.path)}" if one.plan.kind == MotionKind.COVER else ""
-    return f"{contract.name}({', '.join(told)}){covers}"
+    told = [
+        (each.name, argument(policy, each, one.arguments), _where(policy, each, one.arguments))
+        for each in contract.parameters
+    ]
+    covers = f"along {_path(one.plan.path)}" if one.plan.kind == MotionKind.COVER else ""
+    return StepParts(contract.name, tuple(told), covers)
 
 
 def quoted(policy: Policy, one: Invocation, clause: Decisive) -> str:

@@ -1,1 +1,1 @@
-"""A page of a flight on the loopback interface, which grows while it flies."""
+"""Pages on the loopback interface: of a flight, which grows while it flies, and for its approvers."""

@@ -7,7 +7,7 @@ this machine sends that name as `Host`, and is refused. Nothing can be changed b
 import secrets
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from hashlib import sha256
 from http import HTTPStatus
@@ -42,13 +42,10 @@ class PageServer:
 
     def __init__(self, page: Callable[[], ServedPage], port: int = 0) -> None:
         token = secrets.token_urlsafe(24)
-        self._server = _Server((_HOST, port), _Handler)
+        self._server = _Server(port, _Handler)
         self._server.page, self._server.path = page, f"/{token}/"
-        taken = self._server.server_address[1]
-        self._server.hosts = {f"{_HOST}:{taken}", f"localhost:{taken}"}
         #: the address for a browser
-        self.address = f"http://{_HOST}:{taken}/{token}/"
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(_POLL_S,), name="page", daemon=True)
+        self.address = f"{self._server.origin}/{token}/"
 
     @property
     def fault(self) -> Exception | None:
@@ -56,33 +53,47 @@ class PageServer:
         return self._server.fault
 
     def __enter__(self) -> "PageServer":
-        self._thread.start()
+        self._server.begin()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._server.shutdown()
-        self._server.server_close()
+        self._server.end()
 
 
-class _Server(ThreadingHTTPServer):
+class LoopbackServer(ThreadingHTTPServer):
+    """Serves clients on the loopback interface in threads of its own: a limited number, each for a limited time. Raises
+    OSError where the port is taken.
+    """
+
     daemon_threads = True
     request_queue_size = 64
-    page: Callable[[], ServedPage]
-    path: str
-    hosts: set[str]
-    fault: Exception | None = None
 
-    def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
-        super().__init__(address, handler)
+    def __init__(self, port: int, handler: type["LoopbackHandler"]) -> None:
+        super().__init__((_HOST, port), handler)
         self.free = threading.BoundedSemaphore(_MOST_CLIENTS)
+        taken = self.server_address[1]
+        self.origin = f"http://{_HOST}:{taken}"
+        #: the names of this server in a request
+        self.hosts = {f"{_HOST}:{taken}", f"localhost:{taken}"}
+
+    def begin(self) -> None:
+        """Begin to serve."""
+        threading.Thread(target=self.serve_forever, args=(_POLL_S,), name="page", daemon=True).start()
+
+    def end(self) -> None:
+        """Serve no more."""
+        self.shutdown()
+        self.server_close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a client in a thread, if there are not too many."""
         if not self.free.acquire(blocking=False):
             self.shutdown_request(request)
             return
         super().process_request(request, client_address)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a client."""
         try:
             super().process_request_thread(request, client_address)
         finally:
@@ -92,27 +103,56 @@ class _Server(ThreadingHTTPServer):
         """A client that goes away is no fault."""
 
 
+class _Server(LoopbackServer):
+    page: Callable[[], ServedPage]
+    path: str
+    fault: Exception | None = None
+
+
 def _ended(request: socket.socket) -> None:
     """End the connection of a client that is too slow."""
     with suppress(OSError):
         request.shutdown(socket.SHUT_RDWR)
 
 
-class _Handler(BaseHTTPRequestHandler):
-    server: _Server
+class LoopbackHandler(BaseHTTPRequestHandler):
+    """One request of a client, who is ended where it takes too long."""
+
     server_version = "rtshcua"
     sys_version = ""
     timeout = _PATIENCE_S
 
     def setup(self) -> None:
+        """Begin to count the time of the client."""
         super().setup()
         self._late = threading.Timer(_PATIENCE_S, _ended, (self.request,))
         self._late.daemon = True
         self._late.start()
 
     def finish(self) -> None:
+        """The client is served."""
         self._late.cancel()
         super().finish()
+
+    def received(self) -> None:
+        """It has asked; how long the answer takes is not its fault."""
+        self._late.cancel()
+
+    def is_for(self, hosts: Collection[str]) -> bool:
+        """Whether the request is for one of these names alone: one of another name may come from a page elsewhere."""
+        return self.headers.get_all("Host", []) in [[each] for each in hosts]
+
+    def send_own_headers(self) -> None:
+        """Send what every answer says: no copies, no guessing of its type, no use by other pages."""
+        for name, value in _HEADERS:
+            self.send_header(name, value)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: a secret would be in it."""
+
+
+class _Handler(LoopbackHandler):
+    server: _Server
 
     def do_GET(self) -> None:
         self._answer(with_body=True)
@@ -122,10 +162,10 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, *, with_body: bool) -> None:
         known = secrets.compare_digest(self.path.encode("utf-8", "replace"), self.server.path.encode())
-        if self.headers.get("Host") not in self.server.hosts or not known:
+        if not self.is_for(self.server.hosts) or not known:
             self.send_error(HTTPStatus.NOT_FOUND)
             return
-        self._late.cancel()  # it has asked; how long the page takes is not its fault
+        self.received()
         try:
             page = self.server.page()
         except Exception as error:  # noqa: BLE001  the owner of the server has to know
@@ -135,17 +175,13 @@ class _Handler(BaseHTTPRequestHandler):
         same = self.headers.get("If-None-Match") == page.tag
         self.send_response(HTTPStatus.NOT_MODIFIED if same else HTTPStatus.OK)
         self.send_header("ETag", page.tag)
-        for name, value in _HEADERS:
-            self.send_header(name, value)
+        self.send_own_headers()
         if not same:
             self.send_header("Content-Type", "text/html; charset=utf-8")
             self.send_header("Content-Length", str(len(page.data)))
         self.end_headers()
         if with_body and not same:
             self.wfile.write(page.data)
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Nothing: the token would be in it."""
 
 
 _HEADERS: Final = (

@@ -68,14 +68,14 @@ class Canvas:
         return f"matrix({self.scale:.9g} 0 0 {self.scale:.9g} {number(self.x0)} {number(self.y0)})"
 
 
-def canvas(extent: DrawnExtent) -> Canvas:
-    """The canvas that shows a whole extent with a margin."""
+def canvas(extent: DrawnExtent, width: int = WIDTH) -> Canvas:
+    """The canvas that shows a whole extent with a margin, `width` px wide."""
     across = max(extent.east - extent.west, LEAST_EXTENT)
     along = max(extent.north - extent.south, LEAST_EXTENT)
-    scale = min((WIDTH - 2 * MARGIN) / across, (MOST_HEIGHT - 2 * MARGIN) / along)
+    scale = min((width - 2 * MARGIN) / across, (MOST_HEIGHT - 2 * MARGIN) / along)
     height = max(LEAST_HEIGHT, round(along * scale) + 2 * MARGIN)
     middle = (extent.west + extent.east) / 2, (extent.south + extent.north) / 2
-    return Canvas(scale, WIDTH, height, WIDTH / 2 - middle[0] * scale, height / 2 + middle[1] * scale)
+    return Canvas(scale, width, height, width / 2 - middle[0] * scale, height / 2 + middle[1] * scale)
 
 
 def number(value: float) -> str:

@@ -112,20 +112,21 @@ class PlannedStep:
     heights: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class PlannedWay:
-    """The way of a mission."""
-
-    name: str
-    steps: tuple[PlannedStep, ...]
-
-
 class SitePoint(NamedTuple):
     """A place with its height above home."""
 
     x: int
     y: int
     height: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedWay:
+    """The way of a mission, or of some of its steps, which then begins at `begin`; None: on the ground at home."""
+
+    name: str
+    steps: tuple[PlannedStep, ...]
+    begin: SitePoint | None = None
 
 
 class PlannedLeg(NamedTuple):
@@ -198,16 +199,24 @@ class FlownWay:
 
 
 def planned_legs(way: PlannedWay, site: Site) -> Iterator[PlannedLeg]:
-    """The legs of a way, from the ground at home: as `decision/volume.py` plans them.
+    """The legs of a way, from where it begins: as `decision/volume.py` plans them.
 
     A step flies to the first place of its path while it changes its height, and then along the path. A return climbs
     where it is, crosses, and descends at home; at home it only descends.
     """
-    at = SitePoint(*site.home, 0)
+    at = way.begin or SitePoint(*site.home, 0)
     for step in way.steps:
         for to, low, high in _targets(step, at, site):
             yield PlannedLeg(step, at, to, low, high)
             at = to
+
+
+def way_of_step(way: PlannedWay, index: int, site: Site) -> PlannedWay:
+    """The way of one step, from where the steps before it are planned to end."""
+    begin = way.begin or SitePoint(*site.home, 0)
+    for leg in planned_legs(PlannedWay(way.name, way.steps[:index], way.begin), site):
+        begin = leg.end
+    return PlannedWay(way.name, way.steps[index : index + 1], begin)
 
 
 def _targets(step: PlannedStep, at: SitePoint, site: Site) -> Iterator[tuple[SitePoint, int, int]]:

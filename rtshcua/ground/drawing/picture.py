@@ -83,6 +83,13 @@ def picture(title: str, sheets: Sequence[PictureSheet]) -> str:
     return visibly(text)
 
 
+def map_picture(plan: ZoneMap) -> str:
+    """Write a map alone as a picture."""
+    environment, _ = templates(OWN)
+    template = environment.get_template("lone_map.svg")
+    return visibly(template.render(plan=plan, id="map", standalone=True, style=Markup(drawing_style())))
+
+
 def _placed(sheet: PictureSheet, begin: float) -> tuple[PlacedSheet, float]:
     """A sheet on the page, and its lower end."""
     texts: list[PlacedText] = []

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 from rtshcua.ground.drawing.canvas import (
     LINE,
     ROUND,
+    WIDTH,
     Canvas,
     DrawnExtent,
     LabelBox,
@@ -264,11 +265,13 @@ def zone_maps(site: Site) -> tuple[ZoneMap, ...]:
 
 
 def mission_map(
-    site: Site, way: PlannedWay, refused: RefusedParts = NOT_REFUSED, flown: FlownWay | None = None
+    site: Site, way: PlannedWay, refused: RefusedParts = NOT_REFUSED, flown: FlownWay | None = None, width: int = WIDTH
 ) -> ZoneMap:
-    """The map of a mission's way, with the zones near it, what was refused of it, and where it was flown."""
+    """The map of a mission's way, with the zones near it, what was refused of it, and where it was flown; `width` px
+    wide.
+    """
     legs = tuple(planned_legs(way, site))
-    places = [site.home, *(place for leg in legs for place in (leg.begin[:2], leg.end[:2]))]
+    places = [site.home, _begin(site, way), *(place for leg in legs for place in (leg.begin[:2], leg.end[:2]))]
     places += [place for line in _stopping(site, legs) for place in line]
     if flown is not None:
         places += [(each.x, each.y) for part in (*flown.parts, *flown.later) for each in part]
@@ -278,7 +281,11 @@ def mission_map(
     extent = extent_of_places(places)
     extent = DrawnExtent(extent.west - error, extent.south - error, extent.east + error, extent.north + error)
     title = f"The way of {way.name}" if flown is None else f"The planned way of {way.name}, and the flown track"
-    return _map(title, site, site.zones, extent.around(_home(site)), _MapWay(legs, way, refused, flown))
+    return _map(title, site, site.zones, extent.around(_home(site)), _MapWay(legs, way, refused, flown), width)
+
+
+def _begin(site: Site, way: PlannedWay) -> Point:
+    return site.home if way.begin is None else way.begin[:2]
 
 
 class _MapWay(NamedTuple):
@@ -312,9 +319,10 @@ def _home(site: Site) -> DrawnExtent:
 
 
 def _map(
-    title: str, site: Site, zones: Sequence[ZoneView], extent: DrawnExtent, shown: _MapWay | None = None
-) -> ZoneMap:
-    on = canvas(extent)
+    title: str, site: Site, zones: Sequence[ZoneView], extent: DrawnExtent, shown: _MapWay | None = None,
+    width: int = WIDTH,
+) -> ZoneMap:  # fmt: skip
+    on = canvas(extent, width)
     labels = Labels(on.width, on.height)
     bar = _bar(on)
     labels.reserve(LabelBox(8, on.height - 34, bar[0] + 16, 30))  # the scale bar
@@ -402,7 +410,7 @@ class _DrawnWay(NamedTuple):
 
 def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
     legs, _, refused, flown = shown
-    line = [on.at(*site.home), *(on.at(*leg.end[:2]) for leg in legs)]
+    line = [on.at(*_begin(site, shown.way)), *(on.at(*leg.end[:2]) for leg in legs)]
     home = on.at(*site.home)
     homeward = [(on.at(*place), home) for place in _homeward(site, legs)]
     stopping = [(on.at(*begin), on.at(*end)) for begin, end in _stopping(site, legs)]
@@ -506,7 +514,7 @@ def boxes_along(*lines: Sequence[tuple[float, float]]) -> tuple[LabelBox, ...]:
 def _stops(on: Canvas, way: PlannedWay, site: Site) -> dict[tuple[float, float], list[int]]:
     """The places where steps end, with their numbers. A step without a path ends where the previous one did."""
     found: dict[tuple[float, float], list[int]] = {}
-    at = site.home
+    at = _begin(site, way)
     for step in way.steps:
         at = step.path[-1] if step.path else at
         gather(found, on.at(*at), step.number)

@@ -15,6 +15,7 @@ from rtshcua.ground.drawing.drawn_site import (
     PlannedStep,
     PlannedWay,
     Site,
+    SitePoint,
     ZoneOutline,
     ZoneView,
 )
@@ -112,7 +113,8 @@ KINDS: Final[Mapping[type, Mapping[str, FieldKind]]] = {
     },
     ZoneOutline: {"rings": _.PLACE, "centre": _.NO_PLACE, "radius_squared": _.PLACE},
     PlaceView: {"what": _.OUTSIDE, "latitude": _.PLACE, "longitude": _.PLACE, "x": _.PLACE, "y": _.PLACE},
-    PlannedWay: {"name": _.NAME, "steps": _.PLACE},
+    PlannedWay: {"name": _.NAME, "steps": _.PLACE, "begin": _.PART},
+    SitePoint: {"x": _.PLACE, "y": _.PLACE, "height": _.HEIGHT},
     PlannedStep: {
         "number": _.MACHINE, "path": _.PLACE, "motion": _.MACHINE, "altitude": _.HEIGHT, "speed": _.PLACE,
         "heights": _.HEIGHT,

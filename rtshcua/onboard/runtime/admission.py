@@ -125,7 +125,7 @@ class Admission:
     """Builds requests, decodes answers, records them.
 
     An answer about a step that equals the previous one is counted and not recorded again, so that a deferral does
-    not flood the log; `flush` records the count.
+    not flood the log; `flush` records the count. A step that replaced another one is a different step.
     """
 
     def __init__(self, loaded: Loaded, journal: Journal, queue: InvocationQueue, remaining: RemainingLatency) -> None:
@@ -158,7 +158,7 @@ class Admission:
             return None
         asked = invocation if kind == STEP else None
         if asked is not None:
-            last = (step, (answer.outcome, answer.reason, answer.clause, answer.link, answer.target))
+            last = (step, (binding, answer.outcome, answer.reason, answer.clause, answer.link, answer.target))
             if last == self._last and not answer.permit:
                 self._repeated += 1
                 return answer

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from reference.documents import ASKED, approval, hand, low, low_mission
+from reference.documents import ASKED, approval, hand, low, low_mission, replacement
 from reference.flat_case import MISSION, OBSTACLE, M, S
 from reference.world import TICK, Run, assert_audited, loaded
 from rtshcua.model.decision import Decision
@@ -210,3 +210,26 @@ def test_the_remaining_latency_was_measured_and_covers_99_of_100(took: list[int]
     covered = sum(each <= remaining.us for each in latest)
     assert remaining.us in latest
     assert covered * 100 >= 99 * len(latest)
+
+
+def test_step_that_replaces_a_waiting_one_has_a_record_of_its_own() -> None:
+    """Its decision equals the one before, but it is about another step: whoever answers must learn of it."""
+    mission = low_mission()
+    steps = [*mission.invocations]
+    steps[ASKED] = replace(steps[ASKED], on_inadmissible=OnInadmissible.REPLAN)
+    replaceable = replace(mission, invocations=tuple(steps))
+    run = Run(loaded(mission=replaceable))
+
+    def awaited() -> list[str]:
+        told = [json.loads(line) for line in run.lines if b"approval/awaited" in line]
+        return [each["binding"] for each in told]
+
+    while not awaited():
+        run.tick()
+    newer = replace(replaceable, issued_at_us=replaceable.issued_at_us + 1)
+    assert hand(run, replacement(run.loaded, ASKED, newer)) == "accepted"
+    for _ in range(40):
+        run.tick()
+    assert len(awaited()) == 2
+    assert awaited()[1] == run.loaded.bundle.mission.invocations[ASKED].binding.hex() != awaited()[0]
+    assert_audited(run.until_over())

@@ -46,6 +46,7 @@ OPTION_GROUPS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     },
     "approve": {
         "The answer": ("--step", "--role", "--refuse", "--for", "--other-path", "--yes"),
+        "Waiting for questions": ("--wait", "--page", "--runs"),
         "The flight": ("--to", "--flight", "--output", "--replacement"),
         "Signer": ("--as", "--approval-key", "--passphrase-file", "--root"),
     },

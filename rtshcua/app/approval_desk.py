@@ -291,7 +291,9 @@ class ApprovalDesk:
         if isinstance(record, Effect) and record.event == "replacement":
             self._replace(record.detail)
         if why and self._shown is not None:
-            self.tell("closed", f"question {self._shown.asked.number}, {step_words(self._shown.asked.step)}: {why}")
+            if self._shown.nonce:  # else an answer is on its way, and its reply says the same
+                number, step = self._shown.asked.number, self._shown.asked.step
+                self.tell("closed", f"question {number}, {step_words(step)}: {why}")
             self._shown = None
 
     def _look(self) -> None:

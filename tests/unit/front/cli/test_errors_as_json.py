@@ -54,7 +54,7 @@ MISSING: dict[str, str | None] = {
     "qualify": "none.rts --connect udpin:127.0.0.1:1 --vehicle x --pilot x", "sim": None,
     "recover": "none", "witness": "none", "bind": "none none.ulg", "export": "none --to csv",
     "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
-    "demo": "--folder /proc/none",
+    "demo": None,
     "bench": "paper --campaign none", "import": "none.plan", "show": "none", "report": "none", "watch": "none --web",
 }  # fmt: skip
 

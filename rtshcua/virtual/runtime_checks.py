@@ -459,9 +459,10 @@ class RuntimeChecks:
         for frame, parts in self._motion:
             if not life.began_us <= frame.sent_us <= life.ended_us or not parts or not parts <= only_steps:
                 continue
-            at = bisect_right(decided, frame.sent_us) - 1
-            _, kept_us, kind = allowed[at] if at >= 0 else (0, frame.sent_us + 1, MotionKind.HOLD)
-            if kept_us > frame.sent_us or kind not in parts:
+            # in a turn frames are sent first: one of the running step may leave at the moment when the next is allowed
+            first, end = bisect_left(decided, frame.sent_us), bisect_right(decided, frame.sent_us)
+            possible = allowed[max(first - 1, 0) : end]
+            if not any(kept_us <= frame.sent_us and kind in parts for _, kept_us, kind in possible):
                 text = "a frame of a step was sent before the record of its decision was stored"
                 yield JudgedFailure("unrecorded", frame.sent_us, text)
                 return

@@ -575,6 +575,15 @@ def test_frame_may_belong_to_either_of_two_simultaneous_commands() -> None:
     assert found.failures == ()
 
 
+def test_frame_of_a_step_may_leave_at_the_moment_when_the_next_is_allowed() -> None:
+    """A leg to where the vehicle is succeeds in the turn in which its target is sent."""
+    up, there, back = case.low_steps()
+    steps = (up, there, with_fields(there, step=2), with_fields(back, step=3))
+    was = flown(scenario(), bundle=case.seal(case.mission(steps)))
+    assert was.ending == "completed"
+    assert judge(was).failures == ()
+
+
 def test_late_fallback_is_a_failure(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 

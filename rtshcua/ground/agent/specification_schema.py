@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, field_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix
@@ -122,6 +122,14 @@ class SpecificationShape(SpecificationPart):
     intent: Annotated[str, StringConstraints(max_length=1000)] | None = None
     proposed_by: Proposer
     phases: list[PhaseShape]
+
+    @field_validator("version", mode="before")
+    @classmethod
+    def _not_true(cls, value: Any) -> Any:
+        """Refuse `true`, which is equal to 1 in Python."""
+        if isinstance(value, bool):
+            raise PydanticCustomError("literal_error", "value not accepted", {"expected": str(VERSION)})
+        return value
 
 
 def schema() -> dict[str, Any]:

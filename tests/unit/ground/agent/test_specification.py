@@ -71,6 +71,7 @@ SPOILED: list[tuple[tuple[str | int, ...], Any, str, str, str]] = [
     (("vehicle",), None, "E0902", "", "{"),
     (("vehicel",), "quad", "E0902", "/vehicel", '"vehicel"'),
     (("version",), 2, "E0902", "/version", "2"),
+    (("version",), True, "E0902", "/version", "true"),
     (("name",), "two words", "E0902", "/name", '"two words"'),
     (("name",), "any", "E0902", "/name", '"any"'),
     (("proposed_by", "source"), "reflex", "E0902", "/proposed_by/source", '"reflex"'),

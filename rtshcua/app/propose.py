@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import rtshcua.ground.agent.specification  # noqa: F401  loaded before a proposal comes, which may not wait for it
 from rtshcua.app.programs import NO_TEXTS, SourceReader, compile_reading, examine
-from rtshcua.diagnostics.diagnostic import has_errors
+from rtshcua.diagnostics.codes import SPECIFICATION_SHAPE
+from rtshcua.diagnostics.diagnostic import Diagnostic, has_errors
 from rtshcua.ground.agent.narrowed_schema import narrowed, permitted_skills
 from rtshcua.ground.agent.rejections import frame_of, rejections
 from rtshcua.ground.checker.arguments import bind_value
@@ -97,6 +98,12 @@ class Missions:
         if compiled.mission is None or compiled.policy is None:
             source = reading.program.sources[PROPOSAL]
             first, more = rejections(specification, compiled.diagnostics, source, self._frame)
+            return ProposalAnswer(None, None, first, None, more)
+        own = self.policy.vehicle.name
+        if compiled.policy.vehicle.name != own:
+            source = reading.program.sources[PROPOSAL]
+            found = Diagnostic(SPECIFICATION_SHAPE, f"the signed policy is for `{own}`", pointer="/vehicle")
+            first, more = rejections(specification, [found], source, self._frame)
             return ProposalAnswer(None, None, first, None, more)
         bounds = None if compiled.bounds is None else compiled.bounds._asdict()
         return ProposalAnswer(compiled.policy, compiled.mission, [], bounds)

@@ -302,3 +302,9 @@ def test_rejections_are_capped_and_the_rest_counted(missions: Missions, wrong: i
     ]
     assert {each["message"].split("`")[0] for each in answer.rejections} == {"unknown key "}
     assert answer.more == more
+
+
+def test_mission_for_another_vehicle_of_the_sources_is_refused(missions: Missions) -> None:
+    """Its policy would differ from the signed one, and could not be proposed."""
+    (found,) = missions.check(deepcopy(PROPOSAL) | {"vehicle": "surveyor"}, 0).rejections
+    assert (found["code"], found["field"], found["nearest"]) == ("E0902", "/vehicle", "quad")

@@ -483,7 +483,9 @@ def test_attacker_without_the_key_has_no_effect(tmp_path: Path, target: Target) 
     assert audit.returncode == 0, audit.stdout + audit.stderr
 
 
-@TARGETS
+@pytest.mark.parametrize(
+    "target", [PX4, pytest.param(COPTER, marks=pytest.mark.soak)], ids=lambda target: target.flavour
+)
 def test_same_commands_with_the_key_have_their_effect(tmp_path: Path, target: Target) -> None:
     """During a flight through the gateway, over the same path, once signed rightly with a fresh timestamp."""
     with flying(tmp_path, target) as (_, client, attacker):

@@ -10,7 +10,7 @@ from boundary.secure_world import InSecureWorld, lower_limits, needs_emulator
 pytestmark = needs_emulator
 
 #: in CI 20,000 requests to decide, in the soak a million
-CHUNKS, CHUNK = 10, 2_000
+CHUNKS, CHUNK = 5, 2_000
 SOAK_CHUNKS, SOAK_CHUNK = 100, 10_000
 
 

@@ -357,7 +357,7 @@ def test_key_without_a_trust_root_is_refused(ground: Any, base: str, place: Path
 
 @pytest.mark.clients
 @pytest.mark.long
-@BOTH
+@pytest.mark.parametrize("mode", [pytest.param(LEGACY, marks=pytest.mark.soak), AUTO])
 def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path, mode: str) -> None:
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
@@ -447,12 +447,15 @@ def test_agents_cancellation_flies_the_contingency(ground: Any, base: str, place
         cancelled = await call(session, "cancel")
         assert (cancelled["accepted"], cancelled["flies"][-1]) == (True, "emergency_land"), cancelled
         again = await call(session, "cancel")
-        assert again["accepted"] is False
+        assert not again.get("accepted"), "it is cancelled, or over already"
         late = await call(session, "replan", mission=PROPOSAL, from_step_number=4, idempotency_key="back")
         while not (status := await call(session, "mission_status", ticket=ticket, wait_s=10))["over"]:
             pass
         assert status["ending"] == "cancelled", status
-        assert (await call(session, "mission_status", ticket=late["ticket"]))["state"] == "refused"
+        if "ticket" in late:
+            assert (await call(session, "mission_status", ticket=late["ticket"]))["state"] == "refused"
+        else:
+            assert late["code"] == "not-flying", "it was over already"
 
     session_of(ground, base, place, work)
     assert run.end().code == 6, run.stderr

@@ -200,7 +200,7 @@ def test_hostile_files_take_bounded_time_and_memory(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=settings().max_examples * 4, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=settings().max_examples * 2, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_flipped_bytes_never_raise(tmp_path: Path, data: st.DataObject) -> None:
     log = bytearray(data.draw(st.sampled_from((px4_log, ardupilot_log)))(TRACK, BOOTED_US))

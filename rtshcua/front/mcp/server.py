@@ -143,6 +143,14 @@ class Opening:
             self._done.set()
 
 
+async def _tools(opening: Opening) -> Any:
+    """Return the tools. Raises MCPError where they cannot be made: of other errors the SDK tells a host nothing."""
+    try:
+        return await run_sync(opening.get)
+    except Exception as error:
+        raise MCPError(code=types.INTERNAL_ERROR, message=f"the server has no tools: {error}") from error
+
+
 def serve(make: Callable[[], Any], begun: Greeted) -> None:
     """Serve the standard streams until the host ends the session. `make` returns the tools (`tools.Tools`)."""
     _quieten()
@@ -222,10 +230,11 @@ class _Changes:
         await self._bus.publish(event)
 
     async def begin(self, context: _Context, params: types.SubscribeRequestParams) -> types.EmptyResult:
-        """Start a subscription of 2025-11-25. Raises MCPError for a resource that does not change."""
+        """Start a subscription of 2025-11-25. Raises MCPError for a resource that does not change, or without tools."""
         if _resource(params.uri) not in _CHANGING:
             text = "unknown resource, or a resource that does not change"
             raise MCPError(code=types.INVALID_PARAMS, message=text)
+        await _tools(self._opening)
         about = self._about(context, params.uri)
         self._end(about)
         while len(self._following) >= _MOST_FOLLOWED:
@@ -269,7 +278,10 @@ class _Changes:
             end()
 
     async def _watch(self) -> None:
-        desk = await run_sync(self._opening.get)
+        try:
+            desk = await _tools(self._opening)
+        except MCPError:
+            return  # who asks for anything else is told why; nothing changes here
         known = {name: _state(desk, name) for name in _CHANGING}
         while True:
             await anyio.sleep(_TOLD_S)
@@ -308,7 +320,10 @@ def made(opening: Opening, others: TaskGroup, leaving: anyio.Event) -> "Server[A
     ) -> types.CallToolResult | types.InputRequiredResult:
         if params.name not in schemas:
             return _answer({"code": "no-tool", "text": "unknown tool"}, wrong=True)
-        desk = await run_sync(opening.get)
+        try:
+            desk = await _tools(opening)
+        except MCPError as error:
+            return _answer({"code": "no-tools", "text": error.error.message, "repair": "tell the operator"}, wrong=True)
         try:
             arguments = fitted(schemas[params.name], params.arguments or {})
             if params.name == "mission_status":
@@ -333,7 +348,7 @@ def made(opening: Opening, others: TaskGroup, leaving: anyio.Event) -> "Server[A
         name = _RESOURCES.get(_resource(params.uri))
         if name is None:
             raise MCPError(code=types.INVALID_PARAMS, message="unknown resource")
-        desk = await run_sync(opening.get)
+        desk = await _tools(opening)
         text = writable(await run_sync(getattr(desk, name)))[1]
         contents = types.TextResourceContents(uri=params.uri, text=text, mime_type="application/json")
         return types.ReadResourceResult(contents=[contents])

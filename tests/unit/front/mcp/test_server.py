@@ -13,6 +13,7 @@ import mcp_types as types
 from mcp import Client
 from mcp_types.version import HANDSHAKE_PROTOCOL_VERSIONS, MODERN_PROTOCOL_VERSIONS
 
+from rtshcua.app.propose import NoPolicy
 from rtshcua.front.mcp.greeting import HANDSHAKE_VERSIONS, STATELESS_VERSIONS, Greeted, answer_to, greet
 from rtshcua.front.mcp.server import Opening, made
 from rtshcua.front.mcp.stdio import streams
@@ -43,7 +44,7 @@ def answered(tools: Any, *requests: dict[str, Any], begun: Greeted | None = None
             streams(ours_in, ours_out, begun or Greeted()) as (incoming, outgoing, leaving),
             anyio.create_task_group() as others,
         ):
-            server = made(Opening(lambda: tools), others, leaving)
+            server = made(Opening(tools if callable(tools) else lambda: tools), others, leaving)
             await server.run(incoming, outgoing, server.create_initialization_options())
             others.cancel_scope.cancel()
 
@@ -203,6 +204,44 @@ def test_a_fault_is_told_as_that(mode: str) -> None:
         assert "/root" not in json.dumps(found.structured_content)
 
     served(_Faulty(), mode, work)
+
+
+def test_a_server_without_tools_says_why_and_goes_on() -> None:
+    """Regression: a subscription ended the server, and of a policy with errors a host was told nothing."""
+
+    def none() -> Any:
+        raise NoPolicy("the policy's sources have errors: E0101")
+
+    notified = {"jsonrpc": "2.0", "method": "notifications/initialized"}
+    asked = [
+        {"method": "resources/subscribe", "params": {"uri": "rtshcua://flight"}},
+        {"method": "resources/read", "params": {"uri": "rtshcua://policy"}},
+        {"method": "tools/call", "params": {"name": "describe_policy", "arguments": {}}},
+        {"method": "tools/list", "params": {}},
+    ]
+    requests = [{"jsonrpc": "2.0", "id": number, **each} for number, each in enumerate(asked, 1)]
+    told = {each["id"]: each for each in answered(none, initialize(), notified, *requests)}
+    for number in (1, 2):
+        assert "the policy's sources have errors: E0101" in told[number]["error"]["message"]
+    refused = told[3]["result"]
+    assert refused["isError"]
+    assert (refused["structuredContent"]["code"], "E0101" in refused["structuredContent"]["text"]) == ("no-tools", True)
+    assert len(told[4]["result"]["tools"]) == 9
+
+
+def test_a_listener_without_tools_hears_nothing_and_ends_nothing() -> None:
+    def none() -> Any:
+        raise NoPolicy("errors")
+
+    listens = {"notifications": {"resourceSubscriptions": ["rtshcua://flight"]}, "_meta": ENVELOPE}
+    asked = {"name": "describe_policy", "arguments": {}, "_meta": ENVELOPE}
+    told = answered(
+        none,
+        {"jsonrpc": "2.0", "id": "l", "method": "subscriptions/listen", "params": listens},
+        {"jsonrpc": "2.0", "id": 2, "method": "tools/call", "params": asked},
+        {"jsonrpc": "2.0", "method": "notifications/cancelled", "params": {"requestId": "l", "_meta": ENVELOPE}},
+    )
+    assert [each["result"]["structuredContent"]["code"] for each in told if each.get("id") == 2] == ["no-tools"]
 
 
 @BOTH

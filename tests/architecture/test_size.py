@@ -19,7 +19,7 @@ HELD = {
     "import cycles": 0,
     "modules below 80 lines with one importer": 13,
     "functions of more than 60 lines": 0,
-    "functions of a complexity over 15": 65,
+    "functions of a complexity over 15": 64,
     "functions of a complexity over 25": 0,
     "lines of application logic in the command line": 890,
 }

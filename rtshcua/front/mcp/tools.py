@@ -350,7 +350,7 @@ class Tools:
     def question(self, ticket: str) -> str | None:
         """Return what a person is to be told of the step that waits for an approval, once for each step."""
         known, decided = self._known(ticket), decision_of(list(self.following.records))
-        approval = None if known.state != "admitted" else waits_for(decided, known.followed, _utc_us())
+        approval = None if known.state != "admitted" else waits_for(decided, self._decided_in(decided), _utc_us())
         if approval is None or decided is None or "roles" not in approval or decided["binding"] in known.questions:
             return None
         known.questions.add(decided["binding"])
@@ -366,9 +366,10 @@ class Tools:
     def _brief(self, known: _Ticket, records: Sequence[Mapping[str, Any]], since: int) -> dict[str, Any]:
         """Return the progress of a flight; of fields that say nothing there is none."""
         decided = decision_of(records)
-        told = {} if known.followed is None or self.following.stage != "flying" else progress(records, known.followed)
+        flies = known if self._latest is None else self._latest  # a replacement is followed by either ticket
+        told = {} if flies.followed is None or self.following.stage != "flying" else progress(records, flies.followed)
         told["changed"], told["record"] = changes(records, since)
-        approval = waits_for(decided, known.followed, _utc_us())
+        approval = waits_for(decided, self._decided_in(decided), _utc_us())
         if approval is not None:
             told["approval"] = approval
         elif (refusal := refused(decided)) is not None:
@@ -389,9 +390,7 @@ class Tools:
         seen = self.following
         records = list(seen.records)
         decided = decision_of(records)
-        with self._lock:
-            latest = self._latest
-        approval = waits_for(decided, None if latest is None else latest.followed, _utc_us())
+        approval = waits_for(decided, self._decided_in(decided), _utc_us())
         events = [
             {"step_number": _number(each), "event": each.get("event"), "record": each.get("seq")}
             for each in records
@@ -424,10 +423,17 @@ class Tools:
         told = _decided(chosen)
         if chosen.get("kind") != STEP:
             return told
+        found = self._decided_in(chosen)
+        return told if found is None else told | _explained(chosen, found.policy, found.mission)
+
+    def _decided_in(self, chosen: Mapping[str, Any] | None) -> Followed | None:
+        """Return the mission whose step a decision is about, if it was proposed here: no other's arguments are told."""
+        if chosen is None or chosen.get("kind") != STEP:
+            return None
         with self._lock:
             ours = [*reversed(self._admitted)]
         decided = ((policy, self._as_decided(chosen, mission)) for policy, mission in ours)
-        return told | next((_explained(chosen, policy, flown) for policy, flown in decided if flown is not None), {})
+        return next((Followed(policy, flown, ()) for policy, flown in decided if flown is not None), None)
 
     def _as_decided(self, chosen: Mapping[str, Any], mission: Mission) -> Mission | None:
         """Return this mission with the step as decided, if the recorded step is exactly its own; otherwise None."""

@@ -116,7 +116,7 @@ def _load() -> None:
     """Load the modules of the server and its tools. Errors are reported where the modules are used."""
     with _loading(), suppress(ImportError):
         import rtshcua.front.mcp.server
-        import rtshcua.front.mcp.tools  # noqa: F401
+        import rtshcua.front.mcp.tools  # noqa: F401  loaded for those who use them
 
 
 def _over_http(port: int, token_file: Path, make: Callable[[], object]) -> ExitCode:

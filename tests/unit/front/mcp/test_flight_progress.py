@@ -19,6 +19,7 @@ from rtshcua.front.mcp.flight_progress import (
     waits_for,
 )
 from rtshcua.front.mcp.tools import Misused, Tools
+from rtshcua.wire.binding import bind
 from rtshcua.wire.request import STEP
 from unit.front.mcp.test_tools import CHECKOUT, PROPOSAL, RECORDED, flying, status
 
@@ -42,6 +43,12 @@ def decision(seq: int, step: int, outcome: str = "allow", reason: str = "admitte
 
 def awaited(seq: int, **more: Any) -> dict[str, Any]:
     return decision(seq, 2, "defer", "approval/awaited", clause=ASKED, **more)
+
+
+def own(desk: Tools, record: dict[str, Any]) -> dict[str, Any]:
+    """A decision about a step of the latest admitted mission."""
+    step = bind(desk._admitted[-1][1], desk._signer.digest).invocations[record["step"]]
+    return record | {"invocation": step.invocation_id.hex(), "binding": step.binding.hex()}
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +127,7 @@ def test_status_is_short_and_tells_each_change_once(
     flying(desk)
     quiet = desk.gist(ticket)
     events = [effect(number, event, number % 4) for number, event in enumerate(sorted(TELLING) * 3)]
-    asks = awaited(99, utc_us=1, at_us=2_000_000)
+    asks = own(desk, awaited(99, utc_us=1, at_us=2_000_000))
     desk.following.records.extend([*events, effect(98, "replan", 1), asks])
     assert desk.gist(ticket) != quiet
     found = desk.mission_status(ticket)
@@ -142,15 +149,31 @@ def test_a_person_is_told_once_of_each_step_that_waits(desk: Tools, handed: list
     assert status(desk, ticket) == "admitted"
     flying(desk)
     assert desk.question(ticket) is None
-    desk.following.records.append(awaited(7))
+    desk.following.records.append(awaited(5))
+    assert desk.question(ticket) is None, "a step of a mission that was not proposed here"
+    desk.following.records.append(own(desk, awaited(7)))
     question = desk.question(ticket)
     assert question is not None
     assert question.startswith("Step 3 waits for an approval: inspect_area(")
     assert desk.question(ticket) is None
-    desk.following.records.append(awaited(9) | {"binding": "bb" * 32})
-    assert desk.question(ticket) is not None, "another step, or the same one of another mission"
     with pytest.raises(Misused):
         desk.question("of nobody")
+
+
+def test_a_replacement_is_followed_by_both_tickets(desk: Tools, handed: list[bytes]) -> None:
+    first = desk.propose_mission(LOW, "one")["ticket"]
+    assert status(desk, first) == "admitted"
+    flying(desk)
+    before = own(desk, awaited(7))
+    shorter = deepcopy(LOW)
+    shorter["phases"][1]["steps"].pop()
+    second = desk.propose_mission(shorter, "two")["ticket"]
+    assert status(desk, second) == "admitted"
+    desk.following.records.append(own(desk, decision(8, 1)))
+    for ticket in (first, second):
+        assert desk.mission_status(ticket)["step"] == "2 of 3: goto"
+    desk.following.records.append(before)
+    assert "inspect_area(area = bridge_b" in desk.mission_status(first)["approval"]["step"], "by the step's own mission"
 
 
 def test_kinds_are_known_to_the_reader() -> None:

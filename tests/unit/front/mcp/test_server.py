@@ -18,7 +18,7 @@ from rtshcua.front.mcp.greeting import HANDSHAKE_VERSIONS, STATELESS_VERSIONS, G
 from rtshcua.front.mcp.server import Opening, made
 from rtshcua.front.mcp.stdio import streams
 from rtshcua.front.mcp.tools import Tools
-from unit.front.mcp.test_flight_progress import LOW, awaited
+from unit.front.mcp.test_flight_progress import LOW, awaited, own
 from unit.front.mcp.test_stdio import pipes
 from unit.front.mcp.test_tools import flying, status
 
@@ -68,7 +68,7 @@ def waiting(desk: Tools) -> str:
     ticket: str = desk.propose_mission(LOW, "one")["ticket"]
     assert status(desk, ticket) == "admitted"
     flying(desk)
-    desk.following.records.append(awaited(7))
+    desk.following.records.append(own(desk, awaited(7)))
     return ticket
 
 

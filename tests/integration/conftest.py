@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import select
 import signal
 import socket
@@ -97,6 +98,16 @@ class Run:
             elif record["type"] == "effect" and record["detail"] == "permit/unsent":
                 sent.pop()
         return sent
+
+    def http_port(self, token: Path) -> int:
+        """The port that `rtshcua mcp --http` says that it serves, without its token; a note may come before."""
+        said = b""
+        while b"token`\n" not in said and (line := self.process.stderr.readline()):
+            said += line
+        found = re.search(rb"http://127\.0\.0\.1:(\d+)/mcp", said)
+        assert found, said
+        assert token.read_bytes().strip() not in said
+        return int(found[1])
 
     def _read(self) -> bool:
         out = self.process.stdout

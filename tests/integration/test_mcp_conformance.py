@@ -7,7 +7,6 @@ here with its reason, and docs/agents.md repeats the groups; a check that begins
 import json
 import platform
 import re
-import select
 import socket
 import subprocess
 import tempfile
@@ -129,12 +128,7 @@ def door(grounds: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Doo
         token = ground.folder / "token"
         at = ("--with", str(POLICY), "--http", "0", "--token-file", str(token))
         run = ground.start("mcp", ground.bundle(), "--to", f"{place}/s", *at)
-        assert select.select([run.process.stderr], [], [], 60)[0]
-        found = None
-        while found is None and (line := run.process.stderr.readline().decode()):
-            found = re.search(r"http://127\.0\.0\.1:(\d+)/mcp", line)
-        assert found
-        with closing(Door(int(found[1]), token.read_text().strip())) as made:
+        with closing(Door(run.http_port(token), token.read_text().strip())) as made:
             yield made
         run.process.terminate()
         run.process.wait(20)

@@ -140,13 +140,7 @@ def served(grounds: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
         token = ground.folder / "token"
         at = ("--with", str(POLICY), "--http", "0", "--token-file", str(token))
         run = ground.start("mcp", ground.bundle(), "--to", f"{place}/s", *at)
-        assert select.select([run.process.stderr], [], [], 60)[0]
-        said = b""
-        while b"token`\n" not in said and (line := run.process.stderr.readline()):  # a note may come before it
-            said += line
-        found = re.search(rb"http://127\.0\.0\.1:(\d+)/mcp", said)
-        assert found
-        made = Served(int(found[1]), token.read_text().strip(), run)
+        made = Served(run.http_port(token), token.read_text().strip(), run)
         yield made
         session = made.greeted()
         assert made.status(Mcp_Session_Id=session) == 200, "it still serves who may speak"

@@ -4,8 +4,6 @@ import asyncio
 import http.client
 import json
 import queue
-import re
-import select
 import signal
 import socket
 import subprocess
@@ -473,15 +471,9 @@ def served(ground: Any, base: str, place: Path) -> Iterator[tuple[int, str]]:
     run = ground.start(
         "mcp", base, "--to", str(place), "--with", str(POLICY), "--http", "0", "--token-file", str(token)
     )
-    assert select.select([run.process.stderr], [], [], 60)[0]
-    said, found = "", None
-    while found is None and (line := run.process.stderr.readline().decode()):  # a note may come before
-        said += line
-        found = re.search(r"http://127\.0\.0\.1:(\d+)/mcp", line)
-    assert found, said
-    assert token.read_text() not in said
+    port = run.http_port(token)
     try:
-        yield int(found[1]), token.read_text().strip()
+        yield port, token.read_text().strip()
     finally:
         run.signal(signal.SIGTERM)
         run.process.wait(20)
